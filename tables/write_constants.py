@@ -9,11 +9,14 @@ from write_c import comment
 
 def c_constants(tables: Tables) -> Iterator[tuple[str, Lines]]:
     """A header for each module."""
-    for module in tables["constants"]["module"]:
-        yield module.get("header", f"csrc/src/{module['name']}/constants.h"), _header(module)
+    modules = tables["constants"]["module"]
+    known = {row[0]: row[1] for one in modules for group in one["group"] for row in group["rows"]}
+    for module in modules:
+        header = module.get("header", f"csrc/src/{module['name']}/constants.h")
+        yield header, _header(module, known)
 
 
-def _header(module: Table) -> Lines:
+def _header(module: Table, known: dict[str, Any]) -> Lines:
     core = "header" not in module
     prefix = module.get("prefix", "EITS_")
     about = "The numbers of this module that are a choice, with their reasons."
@@ -32,7 +35,7 @@ def _header(module: Table) -> Lines:
             if written_out:
                 yield f"/* {name} = {value}, in the source as {written_out[0]} */"
             else:
-                yield f"#define {prefix}{name} {_c_value(value)}"
+                yield f"#define {prefix}{name} {_c_value(value, known, core)}"
     yield from ("", "/* clang-format on */", "", "#endif")
 
 
@@ -40,11 +43,16 @@ def _said(what: str, unit: str) -> str:
     return f"{what} [{unit}]" if unit else what
 
 
-def _c_value(value: Any) -> str:
-    """Its bits are those of a double literal that is cast; a text is C as it stands."""
+def _c_value(value: Any, known: dict[str, Any], core: bool) -> str:
+    """Its bits are those of a double literal that is cast; a text is C as it stands, or names the
+    row that has the value. Firmware has floats."""
+    if isinstance(value, str) and value.startswith("= "):
+        value = known[value.removeprefix("= ")]
     if isinstance(value, list):
         return f"R(sizeof(eits_real) == 4 ? {value[0]} : {value[1]})"
-    return f"R({value!r})" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"R({value!r})" if core else f"{value!r}f"
+    return str(value)
 
 
 def python_constants(tables: Tables, package: str) -> Lines:

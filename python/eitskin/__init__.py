@@ -1,12 +1,12 @@
 """eitskin: electrical impedance tomography skins, from a skin's description to touches.
 
-What stands in ``__all__`` is public and stays (docs/reference/python-api.md); the rest may change.
-Each name is imported when it is first used.
+The names in ``__all__`` are public and stable (docs/reference/python-api.md); all others may
+change. Each name is imported when it is first used.
 """
 
 from importlib import import_module
 
-TYPE_CHECKING = False  # as typing has it, without importing that
+TYPE_CHECKING = False  # as in typing, whose import would take time
 if TYPE_CHECKING:
     from typing import Any
 

@@ -1,4 +1,4 @@
-"""``python -m eitskin``: the command line."""
+"""``python -m eitskin``: run the command line."""
 
 import sys
 

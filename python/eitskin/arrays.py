@@ -1,4 +1,4 @@
-"""Names for arrays by what they hold; a docstring says their shape."""
+"""Names for array types by their elements; docstrings state the shapes."""
 
 from typing import Any
 

@@ -1,5 +1,5 @@
-"""TOML tables to dataclasses, strictly: an unknown key is an error that names the nearest known
-one. What cannot be read raises ConfigError, with the file, the table and the key."""
+"""Read TOML tables into dataclasses, strictly: an unknown key is an error that names the nearest
+known one. Errors are ConfigErrors with the file, the table and the key."""
 
 import difflib
 import re
@@ -22,8 +22,8 @@ else:
 MAX_LISTED = 30
 
 MAX_TOML_BYTES = 1_000_000
-MAX_KEY_PARTS = 32  # the parser's time grows with the square of a key's parts
-# A part starts where a word starts, so that the search's time grows with the text's length alone.
+MAX_KEY_PARTS = 32  # the parser's time grows with the square of the number of parts
+# A part must start at the start of a word; otherwise the search would take more than linear time.
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 DEEP_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MAX_KEY_PARTS}}}")
 
@@ -43,19 +43,25 @@ def load_toml(path: str | Path, what: str) -> dict[str, Any]:
 
 
 def parse_toml(text: str, what: str, where: str) -> dict[str, Any]:
-    """The table in ``text``, a ``what``; ``where`` names it in errors."""
+    """Return the table in the TOML ``text``.
+
+    ``what`` names the kind of text in errors, and ``where`` its source.
+
+    Raises:
+        ConfigError: the text is not TOML, is nested too deeply, or has keys of too many parts.
+    """
     try:
         if DEEP_KEY.search(text):
             raise ConfigError(f"{where}: not a {what}: a key of over {MAX_KEY_PARTS} parts")
         return tomllib.loads(text)
-    except ValueError as error:  # also of whole numbers of thousands of digits
+    except ValueError as error:  # raised also for whole numbers with thousands of digits
         raise ConfigError(f"{where}: not valid TOML: {error}") from None
     except RecursionError:
         raise ConfigError(f"{where}: not a {what}: nested too deeply") from None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A remedy for the unknown ``name``: the nearest of ``known``, or all of them where none is
+    """Return a remedy for the unknown ``name``: the nearest of ``known``, or all of them if none is
     near."""
     choices = sorted(known)
     close = difflib.get_close_matches(name, choices, n=1, cutoff=0.5)
@@ -63,18 +69,19 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def listed(items: Sequence[object]) -> str:
-    """ "a, b, c", or of a long list its beginning and how many more there are."""
+    """Return "a, b, c", or for a long list its beginning and how many more there are."""
     shown = ", ".join(map(str, items[:MAX_LISTED]))
     return shown if len(items) <= MAX_LISTED else f"{shown} and {len(items) - MAX_LISTED} more"
 
 
 def first_few(items: Sequence[object], most: int) -> str:
-    """ "a, b, c", or of more than ``most`` these and "..."."""
+    """Return "a, b, c", or "a, b, c, ..." if there are more than ``most``."""
     return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")
 
 
 def check_keys(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:
-    """Refuse keys of ``table`` that are not ``known``; ``where`` says file and table."""
+    """Raise a ConfigError if ``table`` has keys that are not ``known``; ``where`` names file and
+    table."""
     allowed = set(known)
     for key in table:
         if key not in allowed:
@@ -92,8 +99,14 @@ def number(
     open_low: bool = False,
     unit: str = "",
 ) -> float:
-    """The number at ``key``, or ``default`` (None: required), within [low, high] ((low, high] with
-    ``open_low``); ``unit`` is said with the range."""
+    """Return the number at ``key``, or ``default`` (None: the key is required).
+
+    It must be in [low, high], or in (low, high] with ``open_low``. Errors state this range with
+    ``unit``.
+
+    Raises:
+        ConfigError: it is missing, not a number, or out of range.
+    """
     value = table.get(key, default)
     if value is None:
         raise ConfigError(f"{where}: the key {key!r} is required")
@@ -103,21 +116,22 @@ def number(
     if not (finite and low <= value <= high) or (open_low and value == low):
         bounds = [f"{'above' if open_low else 'at least'} {low:g}"] if low > float("-inf") else []
         bounds += [f"at most {high:g}"] if high < float("inf") else []
-        said = " and ".join(bounds) or "finite"
-        said += f" {unit}" if unit not in ("", "1") else ""
-        raise ConfigError(f"{where}: {key} = {value!r} is out of range; it must be {said}")
+        allowed = " and ".join(bounds) or "finite"
+        allowed += f" {unit}" if unit not in ("", "1") else ""
+        raise ConfigError(f"{where}: {key} = {value!r} is out of range; it must be {allowed}")
     try:
         return float(value)
     except OverflowError:
         raise ConfigError(
-            f"{where}: {key} is a number of {len(str(value))} digits; no float holds it"
+            f"{where}: {key} has {len(str(value))} digits, too many for a float"
         ) from None
 
 
 def integer(
     table: Mapping[str, Any], key: str, default: int | None, where: str, *, low: int, high: int
 ) -> int:
-    """The whole number at ``key``, or ``default`` (None: required), within [low, high]."""
+    """Return the whole number at ``key``, or ``default`` (None: the key is required), within [low,
+    high]."""
     value = number(table, key, default, where, low=low, high=high)
     if value != int(value):
         raise ConfigError(f"{where}: {key} = {value!r} must be a whole number")
@@ -125,7 +139,7 @@ def integer(
 
 
 def flag(table: Mapping[str, Any], key: str, default: bool | None, where: str) -> bool:
-    """The truth value at ``key``, or ``default`` (None: required)."""
+    """Return the truth value at ``key``, or ``default`` (None: the key is required)."""
     value = table.get(key, default)
     if not isinstance(value, bool):
         raise ConfigError(f"{where}: {key} must be true or false, not {value!r}")
@@ -133,7 +147,7 @@ def flag(table: Mapping[str, Any], key: str, default: bool | None, where: str) -
 
 
 def word(table: Mapping[str, Any], key: str, default: str | None, where: str) -> str:
-    """The text at ``key``, or ``default`` (None: required)."""
+    """Return the text at ``key``, or ``default`` (None: the key is required)."""
     value = table.get(key, default)
     if not isinstance(value, str):
         raise ConfigError(f"{where}: {key} must be text in quotes, not {value!r}")
@@ -141,7 +155,7 @@ def word(table: Mapping[str, Any], key: str, default: str | None, where: str) ->
 
 
 def subtable(table: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
-    """The table at ``key``, empty where there is none."""
+    """Return the table at ``key``, or an empty one."""
     value = table.get(key, {})
     if not isinstance(value, Mapping):
         raise ConfigError(f"{where}: {key} must be a table: write [{key}]")
@@ -151,7 +165,8 @@ def subtable(table: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any
 def choice(
     table: Mapping[str, Any], key: str, default: str | None, known: Iterable[str], where: str
 ) -> str:
-    """The word at ``key``, or ``default`` (None: required), one of ``known``."""
+    """Return the word at ``key``, or ``default`` (None: the key is required); it must be one of
+    ``known``."""
     options = list(known)
     value = table.get(key, default)
     if value is None:
@@ -173,20 +188,22 @@ def parameter(
     open_low: bool = False,
     choices: tuple[str, ...] = (),
 ) -> Any:
-    """A dataclass field for ``from_table``: its default, its unit, what it is, and its range [low,
-    high], or (low, high]."""
+    """Return a dataclass field for ``from_table`` with its default, its unit, a description, and
+    its range [low, high], or (low, high] with ``open_low``."""
     limits = {"low": low, "high": high, "open_low": open_low or None, "choices": choices or None}
     given = {name: limit for name, limit in limits.items() if limit is not None}
     return field(default=default, metadata={"unit": unit, "doc": doc, **given})
 
 
 def from_table(kind: Any, table: Mapping[str, Any], where: str) -> Any:
-    """The dataclass ``kind`` filled from ``table``; its fields are float, int, bool, str, tuples of
-    these, or one of them ``| None``, within what ``parameter`` says. ``where`` says file and table.
+    """Return the dataclass ``kind`` with the values in ``table``; ``where`` names file and table.
+
+    Its fields are float, int, bool, str, tuples of these, or one of them ``| None``, within the
+    limits that ``parameter`` sets.
 
     Raises:
         ConfigError: a key is unknown, missing, of the wrong type or out of range.
-        EitskinError: what ``kind`` itself refuses, with ``where`` before it.
+        EitskinError: ``kind`` itself refuses the values; ``where`` is put before its text.
     """
     known = {one.name: one for one in fields(kind)}
     check_keys(table, known, where)
@@ -217,7 +234,7 @@ def _value(value: Any, hint: Any, limits: Mapping[str, Any], key: str, where: st
         found = word(table, key, None, where)
         return choice(table, key, None, limits["choices"], where) if "choices" in limits else found
     if hint not in (int, float):
-        raise ConfigError(f"{where}: {key} is declared as {hint}, which tables do not have")
+        raise ConfigError(f"{where}: {key} is declared as {hint}, which tables cannot hold")
     given = {name: limits[name] for name in ("low", "high", "open_low", "unit") if name in limits}
     number(table, key, None, where, **given)
     if hint is int and value != value // 1:

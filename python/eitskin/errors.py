@@ -1,30 +1,30 @@
-"""Everything that eitskin refuses, one class a kind, each with the exit code that the command line
+"""The errors that eitskin raises, one class per kind, each with the exit code that the command line
 returns.
 
 An error's text is one line that says what was wrong, where, and what to do about it.
 docs/reference/error-codes.md lists the codes.
 """
 
-LONGEST, ENDING = 3000, 1000  # characters of a line, and of its end
+LONGEST, ENDING = 3000, 1000  # characters of a line, and of the end that is kept of longer ones
 
 
 class EitskinError(Exception):
-    """Base of all errors that a user can cause or repair; ``exit_code`` is the command line's
-    status. Its text stays one line, whatever names and values out of files it names."""
+    """Base of all errors that a user can cause or repair.
+
+    ``exit_code`` is the status of the command line. The text is always one line, whatever names and
+    values from files it contains.
+    """
 
     exit_code = 1
 
     def __str__(self) -> str:
         text = super().__str__()
-        if (
-            len(text) > LONGEST
-        ):  # somebody's very long word in the middle: what to do is said at the end
+        if len(text) > LONGEST:
+            # A very long word of the user is in the middle; the remedy is at the end.
             text = f"{text[: LONGEST - ENDING - 5]} ... {text[-ENDING:]}"
-        return (
-            text
-            if text.isprintable()
-            else "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)
-        )
+        if text.isprintable():
+            return text
+        return "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)
 
 
 class UsageError(EitskinError):
@@ -46,8 +46,8 @@ class ConfigError(EitskinError):
 
 
 class GeometryError(EitskinError):
-    """An outline or its electrodes cannot be: self-intersecting, overlapping, too small; or meshing
-    failed."""
+    """An outline or its electrodes are impossible (self-intersecting, overlapping, too small), or
+    meshing failed."""
 
     exit_code = 5
 
@@ -83,20 +83,20 @@ class VerificationError(EitskinError):
 
 
 class DeviceError(EitskinError):
-    """A board or its link cannot be used: no port, no answer, another version, another model, a
-    command refused."""
+    """A board or its link cannot be used: there is no port or no answer, the version or the model
+    is another, or a command was refused."""
 
-    exit_code = 12  # 11 is doctor's
+    exit_code = 12  # 11 is the doctor's
 
 
 class SinkError(EitskinError):
-    """What touches are sent to cannot be opened: its port is taken, nobody answers there."""
+    """An output for touches cannot be opened: its port is taken, or nobody answers."""
 
     exit_code = 13
 
 
 def missing_checkout(what: str, *folders: str) -> MissingExtraError:
-    """The error for ``what`` that the wheel does not have, but ``folders`` of a checkout."""
+    """Return the error for ``what``, which is in ``folders`` of a checkout and not in the wheel."""
     names = " ".join(f"./{folder}" for folder in folders)
     return MissingExtraError(
         f"{what} comes with eitskin's sources alone: run there  pip install {names}"
@@ -104,7 +104,8 @@ def missing_checkout(what: str, *folders: str) -> MissingExtraError:
 
 
 def missing_extra(extra: str, package: str) -> MissingExtraError:
-    """The error for an absent optional ``package`` that the extra named ``extra`` brings."""
+    """Return the error for an optional ``package`` that is not installed; the extra ``extra``
+    brings it."""
     return MissingExtraError(
         f"this needs {package}, which is not installed: run  pip install 'eitskin[{extra}]'"
     )

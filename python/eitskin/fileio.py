@@ -1,6 +1,7 @@
-"""Reading and writing files so that nothing is lost: written beside, then renamed.
+"""Read and write files so that nothing is lost: content is written to a temporary file, which is
+then renamed.
 
-Links are followed; devices and FIFOs are written into.
+Links are followed. Devices and FIFOs are written to directly.
 """
 
 import errno
@@ -22,27 +23,29 @@ MOST_BYTES = 100_000_000
 
 
 def refuse_unwritable(*paths: str | Path | None) -> None:
-    """Refuse before long work the outputs that ``write_beside`` would refuse after it; None stands
-    for no output."""
+    """Raise a FileError before long work for outputs that ``write_beside`` would refuse after it.
+    None means no output."""
     for path in (Path(given) for given in paths if given is not None):
         if not path.parent.is_dir():
             raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
         target = followed(path)
         if target.is_dir():
             raise FileError(f"{path}: this is a folder; name a file in it")
-        if not os.access(
-            target if target.exists() and not target.is_file() else target.parent, os.W_OK
-        ):
+        special = target.exists() and not target.is_file()
+        if not os.access(target if special else target.parent, os.W_OK):
             raise FileError(f"{path}: cannot write there (Permission denied); name another folder")
 
 
 @contextmanager
 def write_beside(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path; if the block succeeds, what it wrote becomes the content of ``path``,
-    whole and on the disk, else ``path`` stays as it was.
+    """Yield a temporary path. If the block succeeds, its content becomes that of ``path``,
+    completely and on the disk; otherwise ``path`` stays as it was.
 
-    A regular file is replaced by rename and keeps its mode; a link is followed. What is no regular
-    file (a device, a FIFO) is never replaced: the content is written into it.
+    A regular file is replaced by renaming and keeps its mode; a link is followed. A device or FIFO
+    is never replaced: the content is written to it.
+
+    Raises:
+        FileError: the file cannot be written.
     """
     target = followed(path)
     special = target.exists() and not target.is_file()
@@ -72,18 +75,22 @@ def write_beside(path: str | Path) -> Iterator[Path]:
 
 
 def followed(path: str | Path) -> Path:
-    """Where links lead from ``path``; the file at the end need not exist."""
+    """Return the path that the links of ``path`` lead to; the file itself need not exist.
+
+    Raises:
+        FileError: the links form a circle, or cannot be read.
+    """
     path = Path(path)
     try:
         if path.exists() and not path.is_file():
-            return path  # a device, or the pipe behind /dev/stdout, which has no other name
+            return path  # a device, or the pipe of /dev/stdout, which has no other name
         return path.resolve() if path.is_symlink() else path
     except OSError as error:
         if error.errno != errno.ELOOP:
             raise FileError(f"{path}: cannot write there ({error.strerror})") from None
-    except RuntimeError:  # how Python up to 3.12 names a circle
+    except RuntimeError:  # raised for a circle by Python up to 3.12
         pass
-    raise FileError(f"{path}: its links go in a circle; remove them")
+    raise FileError(f"{path}: its links form a circle; remove them")
 
 
 def replace_by(temporary: Path, target: Path) -> None:
@@ -91,7 +98,7 @@ def replace_by(temporary: Path, target: Path) -> None:
     and wait until file and folder are on the disk.
 
     Raises:
-        OSError: it cannot be done; ``target`` is as it was.
+        OSError: this failed; ``target`` is as it was.
     """
     temporary.chmod(_mode(target))
     with temporary.open("rb") as stream:
@@ -101,8 +108,8 @@ def replace_by(temporary: Path, target: Path) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Wait until the name ``path`` is on the disk, where the system can do that."""
-    with suppress(OSError):  # some systems do not open folders
+    """Wait until the name ``path`` is on the disk, if the system supports that."""
+    with suppress(OSError):  # some systems cannot open folders
         folder = os.open(path.parent, os.O_RDONLY)
         try:
             os.fsync(folder)
@@ -111,7 +118,7 @@ def sync_folder(path: Path) -> None:
 
 
 def locked(stream: IO[bytes]) -> bool:
-    """Lock ``stream`` as who records to it; False where another recorder has it."""
+    """Lock ``stream`` for recording; return False if another recorder holds the lock."""
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -131,7 +138,7 @@ def _mode(path: Path) -> int:
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
-    """Write ``content`` to ``path`` whole or not at all.
+    """Write ``content`` to ``path`` completely or not at all.
 
     Raises:
         FileError: the folder does not exist or cannot be written.
@@ -141,13 +148,17 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
 
 def read_bytes(path: str | Path, what: str, most: int = MOST_BYTES) -> bytes:
-    """The content of ``path``; ``what`` names its kind in the error ("model", "frames file")."""
+    """Return the content of ``path``; ``what`` names its kind in errors ("model", "frames file").
+
+    Raises:
+        FileError: the file is missing, cannot be read, or has more than ``most`` bytes.
+    """
     try:
         with Path(path).open("rb") as stream:
             content = stream.read(most + 1)
     except FileNotFoundError:
         raise FileError(f"{path}: no such {what}; check the path") from None
-    except (OSError, ValueError) as error:  # a ValueError: zero bytes in the path
+    except (OSError, ValueError) as error:  # ValueError: the path has zero bytes
         raise FileError(
             f"{path}: cannot read this {what} ({getattr(error, 'strerror', error)})"
         ) from error
@@ -159,14 +170,19 @@ def read_bytes(path: str | Path, what: str, most: int = MOST_BYTES) -> bytes:
 
 
 def read_mat(path: str | Path) -> dict[str, Any]:
-    """The variables of a .mat file (MATLAB 5 to 7, Octave's -v7): structs as dicts."""
+    """Return the variables of a .mat file (MATLAB 5 to 7, Octave's -v7), with structs as dicts.
+
+    Raises:
+        FileError: the file is missing, or is not such a file.
+        MissingExtraError: scipy is not installed.
+    """
     try:
         from scipy.io import loadmat
     except ImportError:
         raise missing_extra("model", "scipy") from None
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of names that stand twice
+            warnings.simplefilter("ignore")  # about duplicate names
             content = loadmat(str(path), simplify_cells=True, appendmat=False)
     except FileNotFoundError:
         raise FileError(f"{path}: no such MAT file; check the path") from None
@@ -176,7 +192,7 @@ def read_mat(path: str | Path) -> dict[str, Any]:
         ) from None
     except OSError as error:
         raise FileError(f"{path}: cannot read this MAT file ({error.strerror or error})") from None
-    except Exception:  # of a damaged file scipy raises whatever its parser meets
+    except Exception:  # for damaged files scipy raises many kinds
         raise FileError(
             f"{path}: not a readable MAT file: damaged, cut short, or another kind of file"
         ) from None
@@ -184,7 +200,11 @@ def read_mat(path: str | Path) -> dict[str, Any]:
 
 
 def parse_json(text: str | bytes) -> Any:
-    """The values of a JSON ``text``."""
+    """Return the values of a JSON ``text``.
+
+    Raises:
+        ValueError: the text is not JSON, or is nested too deeply.
+    """
     try:
         return json.loads(text)
     except RecursionError:

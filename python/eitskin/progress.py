@@ -1,12 +1,12 @@
-"""How long work shows how far it is: by wrapping the items that it goes through."""
+"""Show the progress of long work by wrapping the items that it processes."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
 
-# gets the items, and their number or title where a step gives one
+# called with the items, and with their number or a title if the step has one
 Progress = Callable[..., Iterable[Any]]
 
 
 def silent(items: Iterable[Any], *_: Any) -> Iterable[Any]:
-    """The items, nothing shown."""
+    """Return the items and show nothing."""
     return items

@@ -16,9 +16,8 @@ from eitskin.session.settings import SessionSettings, kinds_of
 from eitskin.session.zones import load_zones
 from eitskin.sinks.outputs import attached_outputs
 from eitskin.truth import observe_scene
-from eitskin.tuning.for_model import chosen_point
-from eitskin.tuning.front import Target
-from eitskin.tuning.front import preset as named_preset
+from eitskin.tuning.for_model import operating_point_for
+from eitskin.tuning.front import Preset, named_preset
 
 PRESET_CHOOSES = {"solver", "iterations", "gap_rel", "mac_limit"}
 
@@ -41,7 +40,7 @@ def preset(name: str, model: Model | None = None) -> dict[str, Any]:
         UsageError: there is none of that name, or no measured point of such a model.
     """
     used = load_model() if model is None else model
-    point = chosen_point(named_preset(name, "host"), used, default_options(used))
+    point = operating_point_for(named_preset(name, "host"), used, default_options(used))
     return point.configuration.solver_settings
 
 
@@ -123,7 +122,7 @@ def _frames(session: Session) -> Iterator[Frame]:
         messages.close()
 
 
-def _preset(name: str, solver: dict[str, Any]) -> Target:
+def _preset(name: str, solver: dict[str, Any]) -> Preset:
     for other in PRESET_CHOOSES & solver.keys():
         raise UsageError(
             f"stream(preset={name!r}, {other}=...): the preset chooses {other}; leave one out"

@@ -1,5 +1,5 @@
-"""Attaches the truth of a simulated scene to a session. A session with a real board imports neither
-scenes nor scores: they are imported here, and only where the skin is simulated."""
+"""Attach the truth of a simulated scene to a session. Sessions with real boards import neither
+scenes nor scores; this module imports them if the skin is simulated."""
 
 from contextlib import suppress
 
@@ -11,8 +11,9 @@ from eitskin.session.session import Session
 
 
 def observe_scene(session: Session) -> Observer | None:
-    """For ``Session(observe=)``: the truth of the scene before a simulated skin, or of the scene
-    that a recorded board saw, where that is still to be found; None for a real skin.
+    """Return the observer that ``Session(observe=)`` needs: the truth of the scene of a simulated
+    skin, or of the scene that a recorded board saw if it can still be found, or None for a real
+    skin.
 
     Raises:
         FileError, ConfigError, GeometryError, ProtocolError: the scene cannot be read.
@@ -26,6 +27,6 @@ def observe_scene(session: Session) -> Observer | None:
     if not scene.recorded:
         return TruthObserver(truth_of(scene, session.settings.solver.sign or "increase"))
     solver = recorded_options(session.name)
-    with suppress(EitskinError):  # it was a file that is not there any more
+    with suppress(EitskinError):  # the scene was a file that no longer exists
         return TruthObserver(truth_of(scene, "increase" if solver is None else solver.sign))
     return None

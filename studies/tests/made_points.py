@@ -3,12 +3,12 @@
 from typing import Any
 
 from eitskin.tuning.configuration import Configuration
-from eitskin.tuning.front import Conditions, Point, Target, check_wish, read_budget
+from eitskin.tuning.front import Conditions, OperatingPoint, Preset, checked_preset, read_limit
 
 HERE = Conditions()
 
 
-def point(name: str, accuracy: float, instructions: float, **more: Any) -> Point:
+def point(name: str, accuracy: float, instructions: float, **more: Any) -> OperatingPoint:
     """A made-up point; its costliest frame takes twice the mean."""
     costs = {
         "flash_bytes": 1000, "ram_bytes": 1000, "pixels_kept": 812, "acquisition_us": 20_800,
@@ -30,7 +30,7 @@ def point(name: str, accuracy: float, instructions: float, **more: Any) -> Point
     counted = {"kind": "counted", "mean": instructions, "most": 2 * instructions, "macs_mean": macs}
     host_us = {"p50": instructions / 1e4, "p99": instructions, "most": instructions / 5e3}
     scores = {"random": {"60": score}}
-    return Point(Configuration(name, **more), 0.3, 1.0, costs, counted, host_us, scores)
+    return OperatingPoint(Configuration(name, **more), 0.3, 1.0, costs, counted, host_us, scores)
 
 
 POINTS = (
@@ -47,6 +47,6 @@ COLD = POINTS[:-1]
 
 def target(
     budget: str | None = None, accuracy: float | None = None, board: str = "f767", **more: Any
-) -> Target:
-    most = None if budget is None else read_budget(budget)
-    return check_wish(Target(most, accuracy, board, HERE, **more))
+) -> Preset:
+    most = None if budget is None else read_limit(budget)
+    return checked_preset(Preset(most, accuracy, board, HERE, **more))

@@ -19,10 +19,6 @@
  * uneven sheets */
 #define EITS_MAX_DISTANCE R(0.28)
 
-/* the least regularisation on such an instrument [of s_1^2]. larger: fewer details; smaller: the
- * instrument's errors become touches */
-#define EITS_FAR_REGULARISATION R(1.0)
-
 /* beyond this difference of rows and their reciprocals, row gains are off [of the reference's rms].
  * as MAX_DISTANCE */
 #define EITS_MAX_RECIPROCITY R(0.1)
@@ -92,17 +88,9 @@
  * changes little; smaller: noisy boards keep noise */
 #define EITS_MAX_REGULARISATION R(1.0)
 
-/* a lift by less is none [of the model's mu]. larger: steps that show; smaller: pays weights in
- * every product for nothing */
-#define EITS_REGULARISATION_KEPT R(1.01)
-
 /* how little a direction that no row sees is held to zero [of mu]. larger: biases directions that
  * are seen; smaller: the factor's pivots are rounding */
 #define EITS_LOST R(0.01)
-
-/* least pivot of the rows' products [of LOST mu]. as LOST, and met only where rounding is as
- * large */
-#define EITS_LOST_PIVOT R(0.5)
 
 /* F leaves so much room below the stated Lipschitz constant [of |S_1|^2]. larger: rounding may
  * exceed the constant and FISTA rises; smaller: shorter steps */

@@ -1,2 +1,2 @@
-"""A skin's own law from strength to load, learned from known weights: their list, the presses in a
-recording, the fit."""
+"""Calibration of force: the list of known weights, the presses in a recording, and the fit of a law
+from strength to force."""

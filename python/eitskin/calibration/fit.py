@@ -1,12 +1,13 @@
-"""From presses of known load to the law that turns strength and place into load
+"""Fit the law that converts the strength and place of a touch to force, from presses of known force
 (docs/guide/calibration.md).
 
-The strength of a load F at (x, y) is modelled as law(F) / gain(x, y). Laws, all monotone:
-*saturating*, s_max (1 - exp(-F / F0)); *power*, c F^p; and, from four weights on, *stretched*,
-s_max (1 - exp(-(F / F0)^p)), which has both within it. The gain is 1 + a polynomial without
-constant in (x / R, y / R), ridge-regularised. What is minimised is the sum of squared logarithms of
-seen over modelled strength. Law and order are those that predict best what was left out: one place
-after another, or one press after another where there are too few places.
+The strength of a force F at (x, y) is modelled as law(F) / gain(x, y). There are three monotone
+laws: *saturating*, s_max (1 - exp(-F / F0)); *power*, c F^p; and, with four or more weights,
+*stretched*, s_max (1 - exp(-(F / F0)^p)), which contains both. The gain is 1 + a polynomial without
+constant in (x / R, y / R), regularised by a ridge. The fit minimises the sum of squared logarithms
+of measured over modelled strength. The law and the order of the gain are those that best predict
+presses left out of the fit: one place after another, or one press after another if there are too
+few places.
 """
 
 from collections.abc import Callable
@@ -21,27 +22,29 @@ from eitskin.errors import FrameError, missing_extra
 from eitskin.model.force_law import MAX_ORDER, LoadLaw, monomials
 
 MIN_PRESSES, MIN_WEIGHTS, MIN_RATIO = 4, 3, 1.5
-SAME_WEIGHT = 1.005  # loads nearer than that are one
-PLACE_MM = 12.0  # presses whose links are nearer than that are at one place
+SAME_WEIGHT = 1.005  # forces within this ratio count as the same weight
+PLACE_MM = 12.0  # presses closer than this, directly or in a chain, are at the same place
 PLACES_FOR_ORDER = (1, 5, 8, 13, 19)
-WORTH = 0.95  # a higher order, or a law of more numbers, must make the error left at most so large
-LAW_ORDER = 2  # of the gain with which laws are compared
+# A higher order, or a law with more numbers, must reduce the prediction error to this part or less.
+WORTH = 0.95
+LAW_ORDER = 2  # order of the gain with which the laws are compared
 RIDGE = 0.02 / 0.5  # strengths scatter by about 0.02, coefficients are of the order of 0.5
 TABLE_POINTS = 33
 RESAMPLES = 200
-STEP = 1e-5  # of a law's numbers, relative, for their derivatives
+STEP = 1e-5  # relative finite difference of a law's numbers
 MIN_EXPONENT = 0.02
-MIN_STEEPNESS = 0.05  # a law as flat as that tells no loads
-MAX_F0 = 30.0  # times the greatest load: beyond, a saturating law is a straight line
+MIN_STEEPNESS = 0.05  # a flatter law cannot distinguish forces
+MAX_F0 = 30.0  # times the greatest force; beyond it a saturating law is a straight line
 
 
 @dataclass(frozen=True)
 class LawForm:
-    """A law of some positive numbers: strength by load, and load by strength; their names, where a
-    fit begins, its bounds.
+    """The form of a law with some positive numbers.
 
-    ``start`` and ``low``, ``high`` are relative: to strengths and the greatest load (F0); exponents
-    as they are.
+    ``strength`` gives strength from force, ``load`` gives force from strength; both take the law's
+    numbers, called ``names``. ``least_weights`` is how many different weights the fit needs. The
+    fit starts at ``start`` and stays within ``low`` and ``high``: strengths are relative to the
+    median strength, F0 to the greatest force, and exponents are absolute.
     """
 
     strength: Callable[..., FloatArray]
@@ -78,8 +81,8 @@ FORMS = {
 
 @dataclass(frozen=True, eq=False)
 class FittedLaw:
-    """One fit: the ``form``'s numbers, and the ``gain``'s coefficients (t,), the first of them
-    1."""
+    """One fit: the numbers of ``form``, and the coefficients (t,) of the ``gain``, the first of
+    which is 1."""
 
     form: str
     numbers: tuple[float, ...]
@@ -89,17 +92,17 @@ class FittedLaw:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What came of it.
+    """The result of a calibration.
 
     Attributes:
-        law: for the model.
-        fitted: the law and gain in their own numbers.
-        interval: 95 % of each of the law's numbers, by the bootstrap.
-        left_out: relative error (k,) of each press's load when it was left out of the fit.
-        groups: how many places there are; ``by_place``: whether whole places were left out.
-        scatter: relative standard deviation over places of the load that is read, before (one gain)
-            and after.
-        notes: what the data could not fix, in sentences.
+        law: the law in the form that a model stores.
+        fitted: the law and the gain in their own numbers.
+        interval: 95 % interval of each of the law's numbers, by the bootstrap.
+        left_out: relative error (k,) of the force of each press when it was left out of the fit.
+        groups: the number of places; ``by_place``: whether whole places were left out.
+        scatter: relative standard deviation over places of the force, with the same gain everywhere
+            and with the fitted gain.
+        notes: sentences about what the data could not determine.
     """
 
     law: LoadLaw
@@ -112,7 +115,7 @@ class Calibration:
     notes: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON and the model's own description."""
+        """Return the result for JSON and for the description in the model."""
         names = FORMS[self.fitted.form].names
         return {
             "law": self.fitted.form,
@@ -133,8 +136,8 @@ class Calibration:
 
 
 def places_of(place_mm: FloatArray) -> IntArray:
-    """The number of its place for each press (k, 2): presses that a chain of steps below
-    ``PLACE_MM`` joins are at one."""
+    """Return the number of the place of each press (k, 2). Presses connected by a chain of steps
+    below ``PLACE_MM`` are at the same place."""
     label = np.arange(len(place_mm))
     near = np.hypot(*(place_mm[:, None] - place_mm[None]).transpose(2, 0, 1)) < PLACE_MM
     for _ in range(len(label)):
@@ -146,14 +149,18 @@ def places_of(place_mm: FloatArray) -> IntArray:
 
 
 def weights_of(force_n: FloatArray) -> FloatArray:
-    """The different loads, ascending."""
+    """Return the different forces, ascending."""
     ascending = np.sort(force_n)
     another = ascending[1:] > SAME_WEIGHT * ascending[:-1]
     return np.asarray(ascending[np.concatenate([[True], another])])
 
 
 def check_presses(presses: WeighedPresses) -> None:
-    """Refuse what cannot fix a law."""
+    """Check that ``presses`` can determine a law.
+
+    Raises:
+        FrameError: there are too few presses or different weights, or their range is too small.
+    """
     if len(presses) < MIN_PRESSES:
         raise FrameError(
             f"calibration: {len(presses)} presses are too few; record at least {MIN_PRESSES} that"
@@ -175,11 +182,11 @@ def check_presses(presses: WeighedPresses) -> None:
 def calibrate(
     presses: WeighedPresses, radius_mm: float, seed: int = 1, resamples: int = RESAMPLES
 ) -> Calibration:
-    """The law of a skin whose image reaches ``radius_mm`` from its middle; the intervals by
-    ``resamples`` of its places.
+    """Fit the law of a skin whose image reaches ``radius_mm`` from its middle. The intervals come
+    from ``resamples`` draws of its places with replacement.
 
     Raises:
-        FrameError: the presses cannot fix a law, or strength does not grow with load.
+        FrameError: the presses cannot determine a law, or strength does not grow with force.
         MissingExtraError: scipy is not installed.
     """
     check_presses(presses)
@@ -208,7 +215,7 @@ def calibrate(
     fitted = fit(presses, radius_mm, form, order)
     if _steepness(fitted, presses.force_n) < MIN_STEEPNESS:
         raise FrameError(
-            "calibration: strength does not grow with load; look at the list of weights, and at the"
+            "calibration: strength does not grow with force; check the list of weights, and the"
             " touches of each"
         )
     if form != "power" and fitted.numbers[1] > 0.9 * MAX_F0 * presses.force_n.max():
@@ -226,14 +233,15 @@ def calibrate(
 
 
 def _steepness(fitted: FittedLaw, force_n: FloatArray) -> float:
-    """The exponent of load that strength grows with between the least and the greatest weight."""
+    """Return the exponent of force with which strength grows between the least and the greatest
+    weight."""
     ends = np.array([force_n.min(), force_n.max()])
     low, high = np.log(np.maximum(FORMS[fitted.form].strength(ends, *fitted.numbers), 1e-300))
     return float((high - low) / np.log(ends[1] / ends[0]))
 
 
 def fit(presses: WeighedPresses, radius_mm: float, form: str, order: int) -> FittedLaw:
-    """One law and order to all ``presses``."""
+    """Fit one law and one order of the gain to all ``presses``."""
     try:
         from scipy.optimize import least_squares
     except ImportError:
@@ -282,14 +290,14 @@ def fit(presses: WeighedPresses, radius_mm: float, form: str, order: int) -> Fit
 def law_of(
     fitted: FittedLaw, presses: WeighedPresses, radius_mm: float, uncertainty: float
 ) -> LoadLaw:
-    """``fitted`` as a model holds it: the law as a table up to the greatest load of ``presses``,
-    evenly by strength."""
+    """Return ``fitted`` as a model stores it: a table up to the greatest force of ``presses``, at
+    equal steps of strength."""
     shape, most = FORMS[fitted.form], float(presses.force_n.max())
     top = float(shape.strength(np.array(most), *fitted.numbers))
     strength = np.linspace(0.0, top, TABLE_POINTS)
-    load = shape.load(strength[:-1], *fitted.numbers)
+    force_n = shape.load(strength[:-1], *fitted.numbers)
     reach = float(np.hypot(*presses.place_mm.T).max()) / radius_mm
-    table = np.concatenate([load, [most]]).astype(np.float32)
+    table = np.concatenate([force_n, [most]]).astype(np.float32)
     return LoadLaw(
         strength.astype(np.float32), table, fitted.gain.astype(np.float32), fitted.order,
         float(np.float32(radius_mm)),
@@ -300,7 +308,8 @@ def law_of(
 def _left_out(
     presses: WeighedPresses, radius_mm: float, fold: IntArray, form: str, order: int
 ) -> FloatArray:
-    """Relative error (k,) of each press's load by the fit to the presses of other folds."""
+    """Return the relative error (k,) of the force of each press when the fit uses only the presses
+    of other folds."""
     errors = np.empty(len(presses))
     for number in range(int(fold.max()) + 1):
         out = fold == number
@@ -312,8 +321,8 @@ def _left_out(
 
 
 def _best(tried: dict[tuple[str, int], FloatArray]) -> tuple[str, int]:
-    """The first choice that no later one beats by more than ``WORTH``, of errors (k,) by law and
-    order."""
+    """Return the law and order with the best predictions, from errors (k,) by law and order. A
+    later choice wins only if it reduces the error below ``WORTH`` times the best one so far."""
     (best, least), *others = ((key, _rms_log(errors)) for key, errors in tried.items())
     for key, error in others:
         if error < WORTH * least:
@@ -333,7 +342,8 @@ def _interval(
     seed: int,
     resamples: int,
 ) -> tuple[tuple[float, float], ...]:
-    """95 % of the law's numbers over fits to folds drawn with replacement."""
+    """Return the 95 % interval of each of the law's numbers, over fits to folds drawn with
+    replacement."""
     generator, count = np.random.default_rng(seed), int(fold.max()) + 1
     members = [np.flatnonzero(fold == number) for number in range(count)]
     drawn = []
@@ -347,12 +357,12 @@ def _interval(
 
 
 def _scatter(presses: WeighedPresses, errors: FloatArray) -> float:
-    """Relative standard deviation over places of one load's reading: over all, around each weight's
-    own mean."""
+    """Return the relative standard deviation over places of the measured force, around the mean of
+    each weight."""
     residual = 1 + errors
     squares, count = 0.0, 0
     for weight in weights_of(presses.force_n):
-        of_it = residual[np.abs(np.log(presses.force_n / weight)) < np.log(SAME_WEIGHT)]
-        squares += float(((of_it / of_it.mean() - 1) ** 2).sum())
-        count += len(of_it) - 1
+        same = residual[np.abs(np.log(presses.force_n / weight)) < np.log(SAME_WEIGHT)]
+        squares += float(((same / same.mean() - 1) ** 2).sum())
+        count += len(same) - 1
     return float(np.sqrt(squares / max(count, 1)))

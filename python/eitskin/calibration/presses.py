@@ -1,4 +1,4 @@
-"""What a recording of known weights shows: a strength and a place for each press."""
+"""Find the presses of known weights in a recording: a strength and a place for each."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from eitskin.errors import FrameError
 from eitskin.frames.frames import Frames
 from eitskin.solve.reconstructor import Reconstructor
 
-NEAR_MM = 25.0  # a touch that far from where the weight is said to be is not it
+NEAR_MM = 25.0  # a touch further than this from the stated place is not the weight
 
 
 @dataclass(frozen=True, eq=False)
 class WeighedPresses:
-    """k presses: ``force_n`` (k,) N as the list says; ``strength`` (k,) S/m mm^2, the median over
-    the press's frames, and ``place_mm`` (k, 2) as found, medians too."""
+    """Presses of known force: ``force_n`` (k,) in N as listed; ``strength`` (k,) in S/m mm^2 and
+    ``place_mm`` (k, 2) as found, both the median over the frames of a press."""
 
     force_n: FloatArray
     strength: FloatArray
@@ -28,11 +28,12 @@ class WeighedPresses:
         return len(self.force_n)
 
     def take(self, rows: IntArray | BoolArray) -> "WeighedPresses":
+        """Return the presses that ``rows`` selects, by number or as a mask."""
         return WeighedPresses(self.force_n[rows], self.strength[rows], self.place_mm[rows])
 
 
 def joined(parts: Sequence[WeighedPresses]) -> WeighedPresses:
-    """All of several recordings."""
+    """Return the presses of several recordings together."""
     return WeighedPresses(
         np.concatenate([part.force_n for part in parts]),
         np.concatenate([part.strength for part in parts]),
@@ -47,18 +48,24 @@ def find_presses(
     weights: Sequence[Weight],
     where: str,
 ) -> tuple[WeighedPresses, list[str]]:
-    """The presses of ``weights`` in ``frames``, whose frames are counted by ``numbers``; and a line
-    for each that shows no touch."""
-    at = {number: k for k, number in enumerate(numbers)}
+    """Find the presses of ``weights`` in ``frames``, which have the ``numbers``. Return them, and a
+    line for each weight that too few frames show.
+
+    Raises:
+        FrameError: the recording does not have the frames of a weight.
+    """
+    places = {number: k for k, number in enumerate(numbers)}
     reconstructor.tare(frames.reference_voltage_v)
     seen: list[tuple[float, float, float, float]] = []
     unseen: list[str] = []
     for weight in weights:
-        rows = [k for number, k in at.items() if weight.first <= number <= weight.last]
+        rows = [k for number, k in places.items() if weight.first <= number <= weight.last]
         name = f"{where}: frames {weight.first} to {weight.last}"
         if not rows:
-            held = f"frames {min(numbers)} to {max(numbers)}" if numbers else "no frames"
-            raise FrameError(f"{name} of the list of weights are not there; it has {held}")
+            existing = f"frames {min(numbers)} to {max(numbers)}" if numbers else "no frames"
+            raise FrameError(
+                f"{name} of the list of weights do not exist; the recording has {existing}"
+            )
         shown = (_pressed(reconstructor, frames.voltage_v[row], weight) for row in sorted(rows))
         touches = [touch for touch in shown if touch is not None]
         if 2 * len(touches) <= len(rows):
@@ -71,8 +78,8 @@ def find_presses(
 
 
 def _pressed(reconstructor: Reconstructor, frame_v: FloatArray, weight: Weight) -> Touch | None:
-    """The touch that is the weight: the strongest, or where its place is known the nearest; None
-    where there is none."""
+    """Return the touch of the weight: the nearest to the weight's place if that is known, otherwise
+    the strongest. Return None if there is none."""
     reconstructor.forget()
     try:
         touches = reconstructor.reconstruct(frame_v).touches

@@ -1,4 +1,4 @@
-"""The list of known weights that belongs to a recording: CSV with a header, or TOML with
+"""Read the list of known weights that belongs to a recording: CSV with a header, or TOML with
 ``[[press]]`` tables."""
 
 import csv
@@ -19,8 +19,8 @@ MAX_FORCE_N = 1e6
 
 @dataclass(frozen=True)
 class Weight:
-    """One weight on the skin: frames ``first`` to ``last``, both included; ``force_n`` N; its place
-    in mm, where known."""
+    """One weight on the skin, from frame ``first`` to ``last`` inclusive, with its force in N and,
+    if known, its place in mm."""
 
     first: int
     last: int
@@ -29,15 +29,15 @@ class Weight:
 
 
 def load_weights(path: Path) -> list[Weight]:
-    """The weights listed in ``path``.
+    """Return the weights listed in the file ``path``.
 
     Raises:
-        FileError: it cannot be read.
-        ConfigError: a line is not what docs/guide/calibration.md says.
+        FileError: the file cannot be read.
+        ConfigError: a line does not follow docs/guide/calibration.md.
     """
     rows = _toml_rows(path) if path.suffix.lower() == ".toml" else _csv_rows(path)
     if not rows:
-        raise ConfigError(f"{path}: lists no weight; give frames and load of each")
+        raise ConfigError(f"{path}: lists no weight; give the frames and the force of each")
     return [_weight(row, where) for row, where in rows]
 
 
@@ -82,15 +82,15 @@ def _weight(row: Mapping[str, Any], where: str) -> Weight:
     check_keys(row, KEYS, where)
     if ("weight_g" in row) == ("force_n" in row):
         raise ConfigError(
-            f"{where}: give the load as weight_g (grams) or as force_n (newtons), one of them"
+            f"{where}: give the force either as weight_g (grams) or as force_n (newtons)"
         )
     if ("x_mm" in row) != ("y_mm" in row):
         raise ConfigError(f"{where}: a place needs x_mm and y_mm; give both or none")
     first = integer(row, "first", None, where, low=0, high=MAX_FRAMES)
     last = integer(row, "last", first, where, low=first, high=MAX_FRAMES)
     key, unit_n = ("weight_g", NEWTONS_PER_GRAM) if "weight_g" in row else ("force_n", 1.0)
-    load = number(row, key, None, where, low=0, high=MAX_FORCE_N / unit_n, open_low=True)
+    force = number(row, key, None, where, low=0, high=MAX_FORCE_N / unit_n, open_low=True)
     place = None
     if "x_mm" in row:
         place = number(row, "x_mm", None, where), number(row, "y_mm", None, where)
-    return Weight(first, last, unit_n * load, place)
+    return Weight(first, last, unit_n * force, place)

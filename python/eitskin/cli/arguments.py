@@ -1,4 +1,5 @@
-"""How commands declare their options: a line each, defaults said in the help."""
+"""Helpers with which commands declare their options, one line each; the help states the
+defaults."""
 
 import argparse
 import math
@@ -11,20 +12,20 @@ from eitskin.errors import UsageError
 
 
 def above(low: float) -> float:
-    """The lower end of a range that does not belong to it."""
+    """Return the lower end of a range that excludes ``low``."""
     return math.nextafter(low, math.inf)
 
 
-RING_OHM = (above(0), 1e7)  # of --resistor-ring
+RING_OHM = (above(0), 1e7)  # range of --resistor-ring
 SCENE_HELP = "a scene file, or a scene of the library (eitskin scene list)"
 
 
 class Output(PosixPath):
-    """A file that a command writes; ``refuse_named_twice`` looks for these."""
+    """A file that a command writes; ``refuse_named_twice`` checks these."""
 
 
 def refuse_named_twice(options: argparse.Namespace) -> None:
-    """Refuse an output that another option names too, before it is written over."""
+    """Raise a UsageError if another option names an output too, before it is overwritten."""
     named = list(_files_of(options))
     for name, path in named:
         for other, file in named:
@@ -35,7 +36,8 @@ def refuse_named_twice(options: argparse.Namespace) -> None:
 
 
 def _files_of(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
-    """Names of options, and the files they name: a path, or what follows "sim:" and the like."""
+    """Yield the names of options and the files that they name: a path, or the part after "sim:" and
+    the like."""
     for name, value in vars(options).items():
         for one in value if isinstance(value, list) else [value]:
             if isinstance(one, Path):
@@ -64,11 +66,12 @@ def option(
     within: tuple[float, float] | None = None,
     **more: Any,
 ) -> None:
-    """Add an option: ``names`` are its names and what stands for its value, as "-o --output OUT".
+    """Add an option. ``names`` holds its names and the placeholder of its value, such as "-o
+    --output OUT".
 
-    Without a value's name, ``kind``, ``default`` and ``choices`` it is a flag. ``kind`` turns the
-    text into the value; where it is not given it is that of the default. A number must lie
-    ``within``, ends included. The default is said in the help.
+    Without a placeholder, ``kind``, ``default`` and ``choices`` it is a flag. ``kind`` converts the
+    text to the value; by default it is the type of the default value. A number must lie ``within``,
+    ends included. The help states the default.
     """
     listed = names.split()
     metavar = listed.pop() if len(listed) > 1 and not listed[-1].startswith("-") else None
@@ -82,21 +85,21 @@ def option(
     if metavar is not None:
         more["metavar"] = metavar
     if default is not None:
-        said = f"default: %(default){'g' if isinstance(default, float) else 's'}"
-        text = f"{text} ({said})" if text else said
+        shown = f"default: %(default){'g' if isinstance(default, float) else 's'}"
+        text = f"{text} ({shown})" if text else shown
     parser.add_argument(*listed, type=kind, default=default, help=text, **more)
 
 
 def _within(kind: Callable[[str], Any], name: str, low: float, high: float) -> Callable[..., Any]:
-    """``kind``, refusing what lies outside."""
+    """Return ``kind`` extended by a check of the range."""
 
     def read(text: str) -> Any:
         value = kind(text)
         if not low <= value <= high:
-            said = value if isinstance(value, int) else f"{value:g}"
+            shown = value if isinstance(value, int) else f"{value:g}"
             lowest = f"{'' if low == round(low, 12) else 'above '}{round(low, 12):.12g}"
-            raise UsageError(f"{name} {said} is out of range; use {lowest} to {high:.12g}")
+            raise UsageError(f"{name} {shown} is out of range; use {lowest} to {high:.12g}")
         return value
 
-    read.__name__ = getattr(kind, "__name__", "value")  # argparse says it of what is no number
+    read.__name__ = getattr(kind, "__name__", "value")  # argparse names it if this is not a number
     return read

@@ -1,4 +1,5 @@
-"""``eitskin board``: what the board's owner may set: lock, current, limit."""
+"""``eitskin board``: show or change the settings that belong to the board's owner: lock, current,
+limit."""
 
 import argparse
 
@@ -7,7 +8,7 @@ from eitskin.cli.device_options import add_device, open_named
 from eitskin.cli.printing import answer, table
 from eitskin.device.wire.link_table import Setting
 
-SETTINGS = (  # bits of eits_setting, each with what sets and what clears it
+SETTINGS = (  # bits of eits_setting, each with the option that sets it and the one that clears it
     (
         "LOCKED",
         ("--lock", "uploads, settings and lower excitations need the blue button"),
@@ -15,34 +16,34 @@ SETTINGS = (  # bits of eits_setting, each with what sets and what clears it
     ),
     (
         "KEEP_DRIVE",
-        ("--keep-drive", "current flows on where no program listens"),
-        ("--no-keep-drive", "it stops within a second (as delivered)"),
+        ("--keep-drive", "the current keeps flowing when no program listens"),
+        ("--no-keep-drive", "the current then stops within a second (as delivered)"),
     ),
     (
         "SENSE",
         ("--sense", "a sense resistor is fitted: measure the current"),
-        ("--no-sense", "none is fitted (as delivered)"),
+        ("--no-sense", "no sense resistor is fitted (as delivered)"),
     ),
 )
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Show or change what a board's owner has set; the board keeps it over a loss of power."
-        " A locked board takes changes only while its blue button is held."
+        "Show or change the settings of a board's owner. The board keeps them without power. A"
+        " locked board accepts changes only while its blue button is held."
     )
     add_device(parser)
     for name, (on, text), (off, contrary) in SETTINGS:
         either = parser.add_mutually_exclusive_group()
-        for flag, value, said in ((on, True, text), (off, False, contrary)):
-            either.add_argument(flag, dest=name, action="store_const", const=value, help=said)
+        for flag, value, meaning in ((on, True, text), (off, False, contrary)):
+            either.add_argument(flag, dest=name, action="store_const", const=value, help=meaning)
     option(
         parser,
         "--limit-ua UA",
-        "rms, above which it is switched off; 0: as the board is",
+        "switch the current off above this rms value; 0: the board's own limit",
         within=(0, 10_000),
     )
-    option(parser, "--clear-faults", "forget faults, a current above its limit among them")
+    option(parser, "--clear-faults", "clear all faults, including a current above its limit")
     parser.set_defaults(run=run)
 
 

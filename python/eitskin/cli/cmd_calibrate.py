@@ -1,5 +1,5 @@
-"""``eitskin calibrate RECORDING --weights LIST``: known weights on one's own skin, so that touches
-are given in grams."""
+"""``eitskin calibrate RECORDING --weights LIST``: calibrate the force of touches with known weights
+on a skin."""
 
 import argparse
 import sys
@@ -26,9 +26,9 @@ from eitskin.solve.reconstructor import Reconstructor
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Fit the law that turns a touch's strength and place into its load to recordings of"
-        " known weights, say how far it is to be trusted, and store it in a copy of the model."
-        " docs/guide/calibration.md shows how to record them."
+        "Fit the law that converts a touch's strength and place to force, from recordings of"
+        " known weights; state its errors, and store it in a copy of the model."
+        " docs/guide/calibration.md shows how to record the weights."
     )
     option(
         parser, "recordings RECORDING", "frames (.npz) or a run (.eits) of weights", Path, nargs="+"
@@ -41,11 +41,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(
         parser,
         "--sign",
-        "which changes a weight makes",
+        "whether weights increase or decrease the conductivity",
         choices=("increase", "decrease"),
         default="increase",
     )
-    option(parser, "--seed S", "of the resamples behind the intervals", default=1)
+    option(parser, "--seed S", "seed of the resamples for the intervals", default=1)
     option(parser, "-o --output OUT.eitm", "the model with its calibration", Output)
     option(parser, "--json")
     parser.set_defaults(run=run)
@@ -88,12 +88,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def calibrated(model: Model, found: Calibration) -> Model:
-    """``model`` with the calibration, which its description says too."""
+    """Return ``model`` with the calibration, which is also added to its description."""
     return replace(model, load=found.law, meta={**model.meta, "calibration": found.as_dict()})
 
 
 def _frames(path: Path, model: Path | None) -> tuple[Frames, list[int]]:
-    """The frames of a file or run, and the numbers that a list of weights counts them by: a board's
+    """Return the frames of a file or a run, and their numbers as in a list of weights: the board's
     own, or from 0."""
     if path.suffix == ".eits":
         frames, _ = finite_only(frames_of(path, model), str(path))
@@ -117,7 +117,7 @@ def _lines(found: Calibration) -> list[str]:
     lines = [
         (
             f"{facts['presses']} presses at {facts['places']} place{'s' * (found.groups > 1)}, "
-            f"{force_text(found.law.force_n[-1])} the greatest"
+            f"up to {force_text(found.law.force_n[-1])}"
         ),
         f"law                 strength = {FORMS[found.fitted.form].text}",
     ]
@@ -131,11 +131,11 @@ def _lines(found: Calibration) -> list[str]:
         f" {out_mm:.0f} mm"
     )
     lines.append(
-        f"one load, anywhere  standard deviation {100 * after:.1f} % of it ({100 * before:.1f} %"
+        f"same force anywhere standard deviation {100 * after:.1f} % of it ({100 * before:.1f} %"
         " with one gain)"
     )
     lines.append(
-        f"a load left out     off by {100 * facts['error_rms']:.1f} % (rms), 95 % within"
+        f"forces left out     error {100 * facts['error_rms']:.1f} % (rms), 95 % within"
         f" {100 * facts['error_95']:.1f} %, worst {100 * facts['error_worst']:.1f} %; left out by"
         f" {facts['left_out_by']}"
     )

@@ -1,4 +1,5 @@
-"""``eitskin completion SHELL``: commands and options completed by the shell."""
+"""``eitskin completion SHELL``: print the script with which a shell completes commands and
+options."""
 
 import argparse
 
@@ -8,8 +9,8 @@ from eitskin.errors import missing_extra
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Print the script for your shell, such as with  eitskin completion bash >"
-        " ~/.local/share/bash-completion/completions/eitskin ; zsh takes it as a file _eitskin"
+        "Print the completion script for your shell, for example with  eitskin completion bash >"
+        " ~/.local/share/bash-completion/completions/eitskin ; zsh needs it as a file _eitskin"
         " in a folder of $fpath."
     )
     option(parser, "shell", None, choices=("bash", "zsh", "tcsh"))

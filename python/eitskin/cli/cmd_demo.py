@@ -1,5 +1,5 @@
-"""``eitskin demo``: three simulated touches, found by the C core and by an emulated board, beside
-the truth."""
+"""``eitskin demo``: three simulated touches, found by the C core and by an emulated board, compared
+with the truth."""
 
 import argparse
 import sys
@@ -19,16 +19,16 @@ BOARD = "emu:demo"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Simulate three touches on the paper's skin (nonlinear forward model on another, finer"
-        " mesh, noise), reconstruct them with the C core and the prebuilt model, and draw them;"
-        " then let the firmware find them on an emulated board, and compare what it sends with"
-        " this host's results bit by bit."
+        "Simulate three touches on the paper's skin (nonlinear forward model on a different, finer"
+        " mesh, with noise), reconstruct them with the C core and the prebuilt model, and draw"
+        " them. Then let the firmware find them on an emulated board, and compare its results"
+        " with this host's, bit by bit."
     )
     option(parser, "--snr-db DB", "20 log10(rms(V0)/sigma)", default=60.0)
-    option(parser, "--seed", "of noise and contacts", default=1)
+    option(parser, "--seed", "seed of noise and contacts", default=1)
     option(parser, "--picture PNG", None, Output, default=Output("demo.png"))
     option(parser, "--frames NPZ", "also write the simulated frames, with their truth", Output)
-    option(parser, "--no-board", "leave the emulated board out")
+    option(parser, "--no-board", "do not run the emulated board")
     option(parser, "--json")
     parser.set_defaults(run=run)
 
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     numbers, total = count(1), 3 if options.no_board else 4
 
     def step(text: str) -> None:
-        """Say on stderr which step starts, so that nobody waits before a silent terminal."""
+        """Announce on stderr which step starts, so that the terminal is not silent for long."""
         print(f"{next(numbers)}/{total} {text}", file=sys.stderr, flush=True)
 
     demo = run_demo(options.seed, options.snr_db, step)
@@ -56,17 +56,17 @@ def run(options: argparse.Namespace) -> int:
         print(f"{to_text(demo)}\npicture: {options.picture}", flush=True)
     board = None if options.no_board else _board(step)
     if options.json:
-        told = None if board is None else demo_board.to_json(board)
-        print_json({**to_json(demo), "picture": str(options.picture), "board": told})
+        shown = None if board is None else demo_board.to_json(board)
+        print_json({**to_json(demo), "picture": str(options.picture), "board": shown})
     elif board is not None:
         print(f"\n{demo_board.to_text(board)}")
     return 0
 
 
 def _board(step: Callable[[str], None]) -> demo_board.BoardDemo | None:
-    """The same touches on the emulated board; None, with a word on stderr, where emulator or
-    firmware are not installed."""
-    step("the same by the firmware, on an emulated board; ten to thirty seconds")
+    """Find the same touches on the emulated board. If emulator or firmware are not installed, print
+    the reason on stderr and return None."""
+    step("running the firmware on an emulated board; this takes ten to thirty seconds")
     try:
         return demo_board.run_board_demo(BOARD)
     except (MissingExtraError, FileError) as error:

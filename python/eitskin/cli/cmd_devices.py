@@ -1,5 +1,5 @@
-"""``eitskin devices``: serial ports, the boards that answer on them, and how everything else is
-named."""
+"""``eitskin devices``: list the serial ports, the boards that answer on them, and the names of all
+other devices."""
 
 import argparse
 
@@ -10,7 +10,7 @@ from eitskin.device.source import source_schemes
 
 URLS = {
     "auto": "the one board that is plugged in",
-    "serial:PORT": "a serial port; serial:PORT?baud=N where it is not at 1000000 baud",
+    "serial:PORT": "a serial port; serial:PORT?baud=N for other than 1000000 baud",
     "text:PORT": "an instrument that sends lines: text:PORT?layout=FILE (docs/guide/your-board.md)",
     "sim:SCENE": "a simulated board that sees a scene: a file, or a name of  eitskin scene list",
     "emu:SCENE": "the firmware on an emulated board (a checkout: pip install ./firmware/emulator)",
@@ -18,29 +18,29 @@ URLS = {
 }
 
 
-NO_PORT = "no serial port; without a board, play with  --device sim:two_touch"
+NO_PORT = "no serial port; without a board, try  --device sim:two_touch"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "List the serial ports of this computer and ask those that look like a board's what"
-        " they are. Ports that do not are left alone: name one with  eitskin info --device"
+        "List the serial ports of this computer, and ask those that look like a board's what they"
+        " are. Other ports are left alone; ask one of them with  eitskin info --device"
         " serial:PORT."
     )
-    option(parser, "--quiet", "ask no board")
+    option(parser, "--quiet", "do not ask any board")
     option(parser, "--json", "print for programs")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     found = discover(ask=not options.quiet)
-    brought = {f"{scheme}:...": "a source that a package brings" for scheme in source_schemes()}
+    added = {f"{scheme}:...": "a source from another package" for scheme in source_schemes()}
     return answer(
         options,
         {"ports": [port.as_dict() for port in found], "urls": URLS},
         *(map(_line, found) if found else [NO_PORT]),
         "--device takes:",
-        *(f"  {url:14} {meaning}" for url, meaning in (URLS | brought).items()),
+        *(f"  {url:14} {meaning}" for url, meaning in (URLS | added).items()),
     )
 
 
@@ -56,4 +56,4 @@ def _line(found: FoundPort) -> str:
         )
     if found.why is not None:
         return f"{line}{found.why}"
-    return line + ("a board's, not asked" if port.is_board else "no board's")
+    return line + ("a board, not asked" if port.is_board else "not a board")

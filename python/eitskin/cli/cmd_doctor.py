@@ -1,4 +1,5 @@
-"""``eitskin doctor``: what is wrong with frames or with a board, before any image is made."""
+"""``eitskin doctor``: find out what is wrong with frames or with a board, before any image is
+made."""
 
 import argparse
 import copy
@@ -36,17 +37,17 @@ TOUCH_RADIUS_PER_SIZE = 0.05
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Say what is wrong with measured frames before an image is made of them: channel order,"
-        " sign, numbering, dead, exchanged, joined or saturated electrodes, reciprocity, gains,"
-        " noise and drift. Takes a frames file, any source that import reads, or with --device"
-        " a board whose skin is not touched, and then also says which faults the board itself"
-        " reports. Exit code 0: nothing must be repaired; 11: something must."
+        "Find out what is wrong with measured frames before an image is made of them: channel"
+        " order, sign, numbering, dead, exchanged, joined or saturated electrodes, reciprocity,"
+        " gains, noise and drift. The source is a frames file, any source that import reads, or,"
+        " with --device, a board whose skin is not touched; then the faults that the board itself"
+        " reports are listed too. Exit code 0: nothing must be repaired; 11: something must."
     )
     option(parser, "source", "frames file, or CSV, NPZ, MAT as for import", Path, nargs="?")
-    device = parser.add_argument_group("a board in place of a source")
+    device = parser.add_argument_group("a board instead of a source")
     option(device, "--device URL", DEVICE_HELP)
-    option(device, "--frames N", "to be measured", default=32, within=(4, 1024))
-    option(device, "--model MODEL.eitm", "the board's, where it is not the prebuilt one", Path)
+    option(device, "--frames N", "number of frames to measure", default=32, within=(4, 1024))
+    option(device, "--model MODEL.eitm", "the board's model if it is not the prebuilt one", Path)
     option(parser, "--json", "print the report as JSON")
     option(parser, "--picture FILE", "draw what was measured (needs matplotlib)", Output)
     parser.add_argument(
@@ -55,18 +56,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="X,Y[,R]",
         help=(
-            "a touch at a known place in mm, to check the numbering; write --touch=-10,5 where X is"
+            "a touch at a known place in mm, to check the numbering; write --touch=-10,5 if X is"
             " negative"
         ),
     )
     option(
         parser,
         "--resistor-ring OHM",
-        "a ring of equal resistors between neighbouring electrodes stands in for the skin",
+        "resistance between neighbours, if a ring of equal resistors replaces the skin",
         float,
         within=RING_OHM,
     )
-    option(parser, "--touch-in FRAME", "the frame with these touches; else the largest change")
+    option(parser, "--touch-in FRAME", "frame with these touches (default: the largest change)")
     add_import_options(parser)
     parser.set_defaults(run=run)
 
@@ -77,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     ring_ohm = options.resistor_ring
     if ring_ohm is not None and (options.touch or options.skin is not None):
         raise UsageError(
-            "--resistor-ring: a ring stands in for the skin; leave --skin and --touch out"
+            "--resistor-ring: the ring replaces the skin; leave out --skin and --touch"
         )
     if options.picture is not None:
         check_picture(options.picture)
@@ -95,26 +96,27 @@ def run(options: argparse.Namespace) -> int:
         repaired = _repaired(options, report.repair)
         named = read_options(repaired)
         write_layout(options.save_layout, options.source, named, read_protocol(repaired)[0])
-    return _tell(options, report, case)
+    return _print(options, report, case)
 
 
 def _repaired(options: argparse.Namespace, repair: str) -> argparse.Namespace:
-    """``options`` with those of the doctor's advice ``repair``, as  eitskin import  takes them."""
+    """Return ``options`` with those of the doctor's advice ``repair``, as eitskin import takes
+    them."""
     parser = argparse.ArgumentParser()
     add_import_options(parser)
     return parser.parse_args(repair.split(), argparse.Namespace(**copy.deepcopy(vars(options))))
 
 
 def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
-    """Measure, examine, say; with ``--touch`` the second half of the frames is of the touched
-    skin."""
+    """Measure, examine and report. With ``--touch`` the second half of the frames is measured on
+    the touched skin."""
     with open_named(options) as device:
         known = find_model(device.board, options.model, device.transport.name)
         simulated = device.transport.capabilities.own_clock
 
         def before_touches() -> None:
             if not simulated:
-                say("now touch the skin where --touch says, and stay")
+                say("now touch the skin at the place of --touch, and keep the touch")
 
         if not simulated:
             say(f"leave the skin untouched: measuring {options.frames} frames")
@@ -125,10 +127,10 @@ def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
     if options.touch:
         subject = _with_touches(subject, options.touch, options.touch_in)
     report, case = examine_case(_with_ring(subject, options.resistor_ring))
-    return _tell(options, board_findings(report, found), case)
+    return _print(options, board_findings(report, found), case)
 
 
-def _tell(options: argparse.Namespace, report: DoctorReport, case: Case) -> int:
+def _print(options: argparse.Namespace, report: DoctorReport, case: Case) -> int:
     if options.picture is not None:
         draw_report(options.picture, report, case)
     if options.json:
@@ -155,8 +157,8 @@ def _with_touches(subject: Subject, given: list[str], name: str | None) -> Subje
         values = floats(text, "--touch")
         if len(values) not in (2, 3):
             raise UsageError(f"--touch {text}: must be X,Y or X,Y,RADIUS in mm")
-        usual = TOUCH_RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
-        touches.append((values[0], values[1], values[2] if len(values) == 3 else usual))
+        default = TOUCH_RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
+        touches.append((values[0], values[1], values[2] if len(values) == 3 else default))
     if not subject.skin.outline.contains([touch[:2] for touch in touches]).all():
         raise UsageError(
             "--touch: a touch lies outside the skin; give millimetres from the outline's centre"
@@ -167,7 +169,7 @@ def _with_touches(subject: Subject, given: list[str], name: str | None) -> Subje
 
 def _touched(frames: Frames, touches: list[tuple[float, float, float]], name: str | None) -> Frames:
     if not frames.n_frames:
-        raise UsageError("--touch: there is no frame besides the quiet ones")
+        raise UsageError("--touch: there is no frame other than quiet ones")
     if name is not None and name not in frames.frame_name:
         raise UsageError(
             f"--touch-in {name}: no such frame; frames are {', '.join(frames.frame_name[:20])}"

@@ -1,4 +1,4 @@
-"""``eitskin export [FRAMES] -o OUT.mat``: model, frames and images for EIDORS."""
+"""``eitskin export [FRAMES] -o OUT.mat``: export model, frames and images for EIDORS."""
 
 import argparse
 from pathlib import Path
@@ -16,13 +16,13 @@ from eitskin.solve.reconstructor import Reconstructor
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Write EIDORS structs that MATLAB and Octave load: fmdl with electrodes and patterns,"
-        " img_bkgnd, the Jacobian J of its elements, c2f from our pixels to them; with frames"
-        " also vh, vi and img, what our solver makes of them."
+        "Write EIDORS structs that MATLAB and Octave can load: fmdl with electrodes and patterns,"
+        " img_bkgnd, the Jacobian J of its elements, and c2f from our pixels to its elements; with"
+        " frames also vh, vi and img, the images of our solver."
     )
     option(parser, "frames FRAMES.npz", "frames of the model's protocol", Path, nargs="?")
     option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
-    option(parser, "--elements", "about how many triangles", default=3000)
+    option(parser, "--elements", "approximate number of triangles", default=3000)
     option(parser, "-o --output OUT.mat", "file to write", Output, required=True)
     option(parser, "--json")
     parser.set_defaults(run=run)

@@ -1,4 +1,4 @@
-"""``eitskin flash``: firmware, and a model beside it, onto a board through its ST-LINK."""
+"""``eitskin flash``: put firmware and a model onto a board through its ST-LINK."""
 
 import argparse
 import json
@@ -19,17 +19,17 @@ from eitskin.model.prebuilt import load_prebuilt
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Put firmware on a NUCLEO-F767ZI through its ST-LINK, and a model into its first bank,"
-        " by whichever of openocd, st-flash and pyocd is installed. The exact commands are"
-        " printed first. What is not named is what ships with eitskin."
+        "Put firmware on a NUCLEO-F767ZI through its ST-LINK, and a model into its first bank, with"
+        " openocd, st-flash or pyocd, whichever is installed. The exact commands are printed first."
+        " By default the firmware and the model that ship with eitskin are used."
     )
     option(parser, "--image BIN", "firmware (default: the prebuilt one)", Path)
     option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
-    option(parser, "--no-model", "leave the board's models as they are")
-    option(parser, "--tool", "default: the first that is installed", choices=TOOLS)
-    option(parser, "--serial NUMBER", "the ST-LINK's, where several boards are plugged in")
+    option(parser, "--no-model", "do not change the models on the board")
+    option(parser, "--tool", "default: the first one installed", choices=TOOLS)
+    option(parser, "--serial NUMBER", "serial number of the ST-LINK, if several are plugged in")
     option(parser, "--dry-run", "print the commands and do nothing")
-    option(parser, "--json", "print for programs; with --dry-run")
+    option(parser, "--json", "print for programs; only with --dry-run")
     parser.set_defaults(run=run)
 
 
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     if options.no_model and options.model is not None:
         raise UsageError("flash: --model and --no-model contradict each other; give one of them")
     if options.json and not options.dry_run:
-        raise UsageError("flash: --json goes with --dry-run; without it the tool itself talks")
+        raise UsageError("flash: --json needs --dry-run; without it the tool prints its own output")
     model = None
     if not options.no_model:
         model = (load_prebuilt() if options.model is None else load_model(options.model))[1]
@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     except BaseException:
         shutil.rmtree(folder)
         raise
-    if options.dry_run:  # the files stay: the commands name them
+    if options.dry_run:  # the files must stay, because the commands name them
         facts = {"tool": plan.tool, "commands": [list(command) for command in plan.commands]}
         print(json.dumps(facts, indent=2) if options.json else "\n".join(plan.lines()))
         return 0
@@ -64,7 +64,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _prebuilt_image(folder: Path) -> Path:
-    """The image that ships with the package, as a file in ``folder`` that a tool can read."""
+    """Write the image that ships with the package to ``folder``, where a tool can read it, and
+    return its path."""
     path = folder / f"{BOARD}.bin"
     write_bytes(path, load_image()[0])
     return path

@@ -1,4 +1,4 @@
-"""``eitskin import``: somebody else's measured frames to a frames file."""
+"""``eitskin import``: convert measured frames of another instrument to a frames file."""
 
 import argparse
 from pathlib import Path
@@ -14,13 +14,13 @@ from eitskin.frames.importer import import_frames
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Turn a text, NPY, NPZ or MAT file of measured voltages into a frames file, in the"
-        " protocol's order, signed, in volts. Run  eitskin doctor SOURCE  first to learn which"
-        " options it needs."
+        "Convert a text, NPY, NPZ or MAT file of measured voltages to a frames file, in the"
+        " protocol's order, with signs, in volts. Run  eitskin doctor SOURCE  first to find out"
+        " which options the source needs."
     )
     option(parser, "source", "CSV or other text, NPY, NPZ, MAT, or a frames file to repair", Path)
     option(parser, "-o --output OUT.npz", "frames file to write", Output, required=True)
-    option(parser, "--json", "say what was written as JSON")
+    option(parser, "--json", "describe the result as JSON")
     add_import_options(parser)
     parser.set_defaults(run=run)
 
@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
     if options.save_layout is not None:
         write_layout(options.save_layout, options.source, named, protocol)
     save_frames(options.output, frames)
-    said: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "written": str(options.output),
         "frames": frames.n_frames,
         "quiet_frames": len(frames.reference_voltage_v),
@@ -45,14 +45,14 @@ def run(options: argparse.Namespace) -> int:
         "unit": frames.meta["unit"],
         "notes": list(frames.meta.get("notes", ())),
     }
-    for note in said["notes"]:
+    for note in facts["notes"]:
         say(f"{options.source}: {note}")
     with_skin = "" if options.skin is None else f" --skin {options.skin}"
     return answer(
         options,
-        said,
-        f"{options.output}: {said['frames']} frame(s) of {said['channels']} channels,"
-        f" {said['quiet_frames']} quiet, {said['electrodes']} electrodes, {said['touches']} known"
-        f" touches; unit {said['unit']}",
+        facts,
+        f"{options.output}: {facts['frames']} frame(s) of {facts['channels']} channels,"
+        f" {facts['quiet_frames']} quiet, {facts['electrodes']} electrodes, {facts['touches']}"
+        f" known touches; unit {facts['unit']}",
         f"next: eitskin doctor {options.output}{with_skin}",
     )

@@ -1,4 +1,4 @@
-"""``eitskin info``: what a board is, which model it has, how it scans, and what it has counted."""
+"""``eitskin info``: show what a board is, which model it has, how it scans, and its counters."""
 
 import argparse
 from typing import Any
@@ -12,11 +12,11 @@ from eitskin.model.storage import STORAGES
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Ask a board what it is, which model it has, how it scans, which faults it reports and"
-        " what it has counted."
+        "Show what a board is, which model it has, how it scans, which faults it reports, and its"
+        " counters."
     )
     add_device(parser)
-    option(parser, "--reset-statistics", "count from zero after this")
+    option(parser, "--reset-statistics", "set the counters to zero afterwards")
     parser.set_defaults(run=run)
 
 
@@ -59,12 +59,12 @@ def _facts(info: BoardInfo, url: str) -> dict[str, Any]:
     )
     step_uv = info.volts_per_code_nv / 1e3
     facts["converter"] = (
-        f"{step_uv:.1f} uV a step at the electrodes"
+        f"{step_uv:.1f} uV per step at the electrodes"
         if step_uv
         else ("another instrument's" if info.frames_given else "none (simulated)")
     )
     kept = ", ".join(info.setting_names) or "none"
-    always = " (it flows although no program listens)" if info.settings & 1 else ""
+    always = " (it flows even if no program listens)" if info.settings & 1 else ""
     facts["current"] = f"{info.drive_name}{always}; the owner's settings: {kept}"
     facts["faults"] = (
         ", ".join(code.name.lower().replace("_", " ") for code in info.fault_codes) or "none"
@@ -74,12 +74,12 @@ def _facts(info: BoardInfo, url: str) -> dict[str, Any]:
 
 def _scan(info: BoardInfo) -> dict[str, str]:
     if info.frames_given:
-        return {"scan": f"another instrument's; {info.frame_us / 1e3:.2f} ms a frame"}
-    sampling = f"{info.samples} samples at {info.sample_rate_hz} a second"
+        return {"scan": f"another instrument's; {info.frame_us / 1e3:.2f} ms per frame"}
+    sampling = f"{info.samples} samples at {info.sample_rate_hz} per second"
     return {
         "excitation": f"{info.excitation_millihz / 1e3:.3f} Hz",
         "sampling": f"{sampling}, {info.settle_us} us after switching",
-        "scan": f"{_rows(info)}; {info.slot_us} us a row, {info.frame_us / 1e3:.2f} ms a frame",
+        "scan": f"{_rows(info)}; {info.slot_us} us per row, {info.frame_us / 1e3:.2f} ms per frame",
     }
 
 
@@ -91,8 +91,8 @@ def _rows(info: BoardInfo) -> str:
     )
 
 
-def _used(used: int, room: int) -> str:
-    return f"{used} of {room} bytes" if room else f"{used} bytes"
+def _used(used: int, total: int) -> str:
+    return f"{used} of {total} bytes" if total else f"{used} bytes"
 
 
 def _counted(stats: BoardStats) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def _counted(stats: BoardStats) -> dict[str, Any]:
             f" {stats.deadlines_missed} deadlines missed, {stats.slots_repeated} measurements"
             " repeated"
         ),
-        "sent": f"{stats.packets_sent} packets, {stats.packets_dropped} dropped for lack of room",
+        "sent": f"{stats.packets_sent} packets, {stats.packets_dropped} dropped (buffer full)",
         "received": (
             f"{stats.link_packets} packets, {stats.link_crc_errors} bad checksums,"
             f" {stats.link_framing_errors} broken, {stats.link_overruns} too long"

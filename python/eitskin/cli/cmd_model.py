@@ -1,4 +1,4 @@
-"""``eitskin model build | voltages | info | verify | upload``."""
+"""``eitskin model build | voltages | info | verify | upload``: commands for models."""
 
 import argparse
 import json
@@ -37,68 +37,68 @@ NUMPY_BOUND = 1e-4
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    build = actions.add_parser("build", help="mesh a skin, take its Jacobian, reduce and store it")
+    build = actions.add_parser("build", help="mesh a skin, reduce its Jacobian and store the model")
     option(
         build, "skin SKIN.toml", "skin description, or a .mat with an EIDORS model", Path, nargs="?"
     )
-    option(build, "--paper", "the paper's 194 mm disk instead of a file")
+    option(build, "--paper", "use the paper's 194 mm disk instead of a file")
     option(build, "-o --output MODEL.eitm", None, Output, required=True)
     option(build, "--rank", "rows of the reduced Jacobian (default: 64, or all if fewer)", int)
-    option(build, "--pixels", "pixels along the longer side", default=32)
+    option(build, "--pixels", "number of pixels along the longer side", default=32)
     option(build, "--storage", choices=("f32", "f16", "i16", "i8"), default="f32")
     option(
         build,
         "--data",
-        "what is solved for: v - v0; (v - v0)/v0, where channels have gains of their own; or"
+        "data that the solver uses: v - v0; (v - v0)/v0, for channels with different gains; or"
         " v0 log(v/v0)",
         choices=("difference", "normalised", "log-ratio"),
         default="difference",
     )
-    option(build, "--elements", "about how many the mesh has", default=3000, within=(100, 500_000))
+    option(build, "--elements", "approximate size of the mesh", default=3000, within=(100, 500_000))
     option(build, "--regularisation", "mu of the whitening", default=0.01)
     option(
         build,
         "--touch-change RATIO",
-        "expected change under a touch over the skin's conductivity: 1.35 for contrasts 3 to"
-        " 10, 2 for metal, 0 for unknown",
+        "expected change of conductivity under a touch, relative to the skin's: 1.35 for contrasts"
+        " 3 to 10, 2 for metal, 0 if unknown",
         default=1.35,
         within=(0, 100),
     )
     option(
         build,
         "--samples",
-        "random skins drawn for the model's errors, 0 for none (default: as [uncertainty] in"
-        " SKIN.toml says, else 500)",
+        "number of random skins drawn for the model errors, 0 for none (default: from"
+        " [uncertainty] in SKIN.toml, or 500)",
         int,
     )
     option(build, "--json")
     build.set_defaults(run=run_build)
     voltages = actions.add_parser(
         "voltages",
-        help="the boundary voltages to expect of each row, and the current and gain that suit",
+        help="predict the voltage of each row, and suitable current and gain",
         description=(
-            "Print the voltage of each row of the untouched skin, or of a ring of equal resistors"
-            " in its place, and say whether the instrument's current and gain suit."
+            "Print the voltage of each row for the untouched skin, or for a ring of equal resistors"
+            " instead, and state whether the instrument's current and gain suit."
         ),
     )
     option(voltages, "skin SKIN.toml", "skin description", Path, nargs="?")
-    option(voltages, "--paper", "the paper's 194 mm disk instead of a file")
+    option(voltages, "--paper", "use the paper's 194 mm disk instead of a file")
     option(
         voltages,
         "--resistor-ring OHM",
-        "between neighbouring electrodes, in place of it",
+        "resistance between neighbours, if a ring of equal resistors replaces the skin",
         float,
         within=RING_OHM,
     )
     option(voltages, "--json")
     voltages.set_defaults(run=run_voltages)
-    info = actions.add_parser("info", help="what is in a model")
+    info = actions.add_parser("info", help="describe a model")
     option(info, "model MODEL.eitm", "default: the prebuilt one", Path, nargs="?")
     option(info, "--json")
     info.set_defaults(run=run_info)
     verify = actions.add_parser(
         "verify",
-        help="run the golden frame through the C core in both widths, and numpy",
+        help="run the golden frame with the C core in both widths, and with numpy",
     )
     option(verify, "model MODEL.eitm", "default: the prebuilt one", Path, nargs="?")
     option(verify, "--json")
@@ -107,8 +107,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "upload",
         help="put a model on a board",
         description=(
-            "Put a model into the bank of a board's flash that is not in use. The board verifies"
-            " it, then swaps; cut at any byte, it keeps its old model. The reference is forgotten."
+            "Put a model into the unused bank of a board's flash. The board verifies it and then"
+            " switches banks; if the upload is interrupted at any byte, the board keeps its old"
+            " model. The board forgets its reference."
         ),
     )
     option(upload, "model MODEL.eitm", None, Path)
@@ -120,8 +121,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run_build(options: argparse.Namespace) -> int:
     from eitskin.frames.homogeneous_fem import transfer_by_elements
 
-    their = read_eidors(options.skin) if _is_eidors(options) else None
-    skin, protocol = _skin_of(options) if their is None else skin_of_eidors(their)
+    eidors = read_eidors(options.skin) if _is_eidors(options) else None
+    skin, protocol = _skin_of(options) if eidors is None else skin_of_eidors(eidors)
     refuse_unwritable(options.output)
     settings = BuildSettings(
         rank=options.rank or 0,
@@ -133,7 +134,9 @@ def run_build(options: argparse.Namespace) -> int:
         touch_change_ratio=options.touch_change,
         samples=options.samples,
     )
-    jacobian = None if their is None else jacobian_on(their, grid_for(skin.outline, options.pixels))
+    jacobian = None
+    if eidors is not None:
+        jacobian = jacobian_on(eidors, grid_for(skin.outline, options.pixels))
     model = build_model(skin, protocol, settings, progress=bar("random skins"), jacobian=jacobian)
     size = save_model(options.output, model)
     _print_info(model, size, str(options.output), options.json)
@@ -148,14 +151,12 @@ def _is_eidors(options: argparse.Namespace) -> bool:
 
 def _skin_of(options: argparse.Namespace) -> tuple[Skin, Protocol]:
     if (options.skin is None) == (not options.paper):
-        raise UsageError(
-            f"model {options.action}: name a SKIN.toml, or give --paper: one of the two"
-        )
+        raise UsageError(f"model {options.action}: give either a SKIN.toml or --paper")
     return (paper_skin(), adjacent(16)) if options.paper else load_skin(options.skin)
 
 
 def run_voltages(options: argparse.Namespace) -> int:
-    """Predict what each row measures."""
+    """Print the predicted voltage of each row."""
     from eitskin.frames.homogeneous_fem import transfer_by_elements
 
     skin, protocol = _skin_of(options)
@@ -222,10 +223,10 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
 
 def _calibration_text(model: Model) -> str:
     if model.load is None:
-        return "none; touches have no load"
+        return "none; touches have no force"
     law = model.load
     return (
-        f"loads to {force_text(law.force_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain"
+        f"up to {force_text(law.force_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain"
         f" of order {law.order}"
     )
 
@@ -235,13 +236,14 @@ def _model_errors_text(model: Model) -> str:
     if errors is None:
         return "none"
     return (
-        f"{100 * errors.rms_error:.1f} % rms by the skin, {100 * errors.rms_shape_error:.1f} % by"
-        " shapes of touches" + ("" if errors.row_gains else "; without row gains from the tare")
+        f"{100 * errors.rms_error:.1f} % rms from the skin, {100 * errors.rms_shape_error:.1f} %"
+        " from shapes of touches"
+        + ("" if errors.row_gains else "; without row gains from the tare")
     )
 
 
 def run_verify(options: argparse.Namespace) -> int:
-    """Run the golden frame; the float32 core must give the stored bits."""
+    """Run the golden frame. The float32 core must reproduce the stored bits."""
     model, blob, name = load_or_prebuilt(options.model)
     portable = CoreEngine(blob, "float32", prepared=False, portable=True)
     differences = {
@@ -259,7 +261,7 @@ def run_verify(options: argparse.Namespace) -> int:
     answer(
         options,
         facts | {"ok": same_bits and within},
-        f"{name}: golden frame, greatest difference to the stored image over its peak",
+        f"{name}: golden frame, greatest difference from the stored image over its peak",
         *(
             f"  {engine:20} {'the same bits' if difference == 0 else f'{difference:.2e}'}"
             for engine, difference in differences.items()
@@ -267,18 +269,19 @@ def run_verify(options: argparse.Namespace) -> int:
     )
     if not same_bits:
         raise VerificationError(
-            f"{name}: the C core does not give the golden image's bits; rebuild the model with this"
-            " version"
+            f"{name}: the C core does not reproduce the bits of the golden image; build the model"
+            " again with this version"
         )
     if not within:
         raise VerificationError(
-            f"{name}: an engine is further than {NUMPY_BOUND:g} from the golden image; report this"
+            f"{name}: an engine differs by over {NUMPY_BOUND:g} from the golden image; report this"
         )
     return 0
 
 
 def _numpy_difference(model: Model) -> float:
-    """Of the golden frame's image by the numpy reference to the stored one, over its peak."""
+    """Return the greatest difference between the numpy reference's image of the golden frame and
+    the stored one, over the peak."""
     reference = Reconstructor(model, engine="numpy")
     reference.tare(model.golden.reference_v)
     image = reference.reconstruct(model.golden.frame_v, touches=False).image
@@ -286,7 +289,7 @@ def _numpy_difference(model: Model) -> float:
 
 
 def run_upload(options: argparse.Namespace) -> int:
-    """Send the model, with a bar on stderr where that is a terminal."""
+    """Send the model, with a progress bar on stderr if that is a terminal."""
     _, blob = load_model(options.model)
     with open_device(options.device) as device:
         with tqdm(

@@ -1,56 +1,74 @@
-"""``eitskin recommend``: the measured settings to take for a budget or an accuracy, and their
-model."""
+"""``eitskin recommend``: choose measured settings by a preset, a time limit or an accuracy, and
+build a model with them."""
 
 import argparse
 from pathlib import Path
 
 from eitskin.cli.arguments import Output, option
-from eitskin.cli.budget_options import add_wish, read_target
+from eitskin.cli.preset_option import add_preset
 from eitskin.cli.printing import answer
 from eitskin.cli.progress import bar
 from eitskin.errors import UsageError
 from eitskin.fileio import refuse_unwritable
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import load_skin, paper_skin
-from eitskin.tuning.front import Conditions, choose, load_front
+from eitskin.tuning.front import (
+    Conditions,
+    Preset,
+    checked_preset,
+    choose,
+    load_front,
+    named_preset,
+    read_limit,
+)
 from eitskin.tuning.recommend import Recommendation, write_model
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Choose from measured results: the most accurate point within --budget, or the cheapest"
-        " that reaches --accuracy. The budget holds for solve and touches of the mean frame"
-        " (host: the median), with --worst of the costliest that was counted or timed."
+        "Choose from measured settings: the most accurate ones within --budget, or the cheapest"
+        " ones that reach --accuracy. The budget covers the solver and the touches of the mean"
+        " frame (host: the median); with --worst, of the most expensive frame that was measured."
     )
-    add_wish(parser)
+    add_preset(parser)
+    option(
+        parser,
+        "--budget COST",
+        "greatest cost of solver and touches: 10ms, 800us, 600kMACs, 2.5Minstructions",
+    )
+    option(
+        parser,
+        "--accuracy MIOU",
+        "least accuracy of images (default scenes: 1 to 3 random touches at 60 dB)",
+        float,
+    )
     option(parser, "--board", choices=("f767", "host"), default="f767")
-    option(parser, "--front FRONT.json", "results of your own (eitskin tradeoff run)", Path)
-    option(parser, "--scenes SET", "the set that accuracy is of", default="random")
+    option(parser, "--front FRONT.json", "your own results (eitskin tradeoff run)", Path)
+    option(parser, "--scenes SET", "set of scenes that the accuracy refers to", default="random")
     option(parser, "--snr-db DB", default=60.0)
-    option(parser, "--by", "whose MIoU", choices=("image", "discs"), default="image")
-    option(parser, "--period TIME", "to measure a frame, as 12ms (default: the budget, or 20.8ms)")
-    option(parser, "--worst", "hold the costliest frame to the budget, not the mean one")
-    option(parser, "--warm", "also points that begin each frame from the last's image")
+    option(parser, "--by", "MIoU that counts", choices=("image", "discs"), default="image")
+    option(
+        parser,
+        "--period TIME",
+        "greatest time to measure a frame, such as 12ms (default: the budget, or 20.8ms)",
+    )
+    option(parser, "--worst", "apply the budget to the most expensive frame, not to the mean one")
+    option(parser, "--warm", "also allow settings that start each frame from the last image")
     option(parser, "-o --output MODEL.eitm", "build and write the model to use", Output)
-    option(parser, "--skin SKIN.toml", "of the model (default: the paper's 194 mm disk)", Path)
+    option(parser, "--skin SKIN.toml", "skin of the model (default: the paper's disk)", Path)
     option(parser, "--json")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    target = read_target(
-        options,
-        options.board,
-        Conditions(options.scenes, options.snr_db, options.by),
-        options.period,
-    )
+    preset = _read(options)
     refuse_unwritable(options.output)
     if options.skin is not None and options.output is None:
         raise UsageError("--skin is for the model; name its file with  -o MODEL.eitm")
     front = load_front(options.front)
     usable = [one for one in front.points if options.warm or not one.configuration.warm_start]
-    point = choose(usable, target)
-    chosen = Recommendation(point, target)
+    point = choose(usable, preset)
+    chosen = Recommendation(point, preset)
     facts, lines = chosen.as_dict() | {"front": front.where_from, "model": None}, [chosen.text()]
     if options.output is not None:
         named = options.skin
@@ -58,9 +76,30 @@ def run(options: argparse.Namespace) -> int:
         size = write_model(options.output, point, skin, protocol, bar("random skins"))
         facts["model"] = str(options.output)
         lines.append(
-            f"{options.output}: {size} bytes; its defaults are these settings, as far as a model"
-            " holds them"
+            f"{options.output}: {size} bytes; these settings are its defaults, as far as a model"
+            " can hold them"
         )
         if named is not None:
-            lines.append("the numbers are of the paper's skin; on another one they may differ")
+            lines.append(
+                "the numbers were measured on the paper's skin; on another they may differ"
+            )
     return answer(options, facts, *lines)
+
+
+def _read(options: argparse.Namespace) -> Preset:
+    """Return the preset that ``--preset`` names, or the limits of the other options."""
+    where = Conditions(options.scenes, options.snr_db, options.by)
+    if options.preset is not None:
+        if any(one is not None for one in (options.budget, options.accuracy, options.period)):
+            raise UsageError(
+                "--preset already sets limits; leave out --budget, --accuracy and --period"
+            )
+        return named_preset(options.preset, options.board, where)
+    limit = None if options.budget is None else read_limit(options.budget)
+    period = None if options.period is None else read_limit(options.period)
+    if period is not None and period.unit != "us":
+        raise UsageError(f"--period {options.period}: give a time, such as 12ms")
+    period_us = None if period is None else period.value
+    return checked_preset(
+        Preset(limit, options.accuracy, options.board, where, period_us, options.worst)
+    )

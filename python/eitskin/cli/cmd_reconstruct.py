@@ -1,4 +1,4 @@
-"""``eitskin reconstruct FRAMES``: images and touches of recorded frames."""
+"""``eitskin reconstruct FRAMES``: reconstruct images and touches from recorded frames."""
 
 import argparse
 import json
@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
-from eitskin.cli.budget_options import add_wish, named_target
 from eitskin.cli.device_options import add_solver, named_solver
+from eitskin.cli.preset_option import add_preset, read_preset
 from eitskin.cli.printing import say
 from eitskin.cli.progress import bar
 from eitskin.errors import FrameError, UsageError
@@ -17,59 +17,59 @@ from eitskin.reconstruct.steps import ReconstructSettings, reconstruct_frames
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Turn frames into touches in millimetres and images. Where the frames carry the truth,"
-        " the touches are compared with it."
+        "Turn frames into touches in millimetres and images. If the frames hold the truth, the"
+        " touches are compared with it."
     )
     option(parser, "frames FRAMES.npz", "a frames file (eitskin import makes one)", Path)
     option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
     option(
         parser,
         "--engine",
-        "the C core in float32 as on a board or in float64, or numpy",
+        "the C core in float32 as on a board, or in float64, or the numpy reference",
         choices=("c", "c64", "numpy"),
         default="c",
     )
     option(
         parser,
         "--sign",
-        "which changes to look for",
+        "which conductivity changes to look for",
         choices=("increase", "decrease", "both"),
         default="increase",
     )
-    option(parser, "--only NAME,...", "frames with these names only")
+    option(parser, "--only NAME,...", "reconstruct only frames with these names")
     add_solver(parser)
-    add_wish(parser)
+    add_preset(parser)
     option(parser, "--warm", "start each frame from the last one's result")
     option(
         parser,
         "--second-pass",
-        "solve again with what touches do to each other taken out of the data",
+        "solve again after the interaction of touches is removed from the data",
     )
     track = parser.add_mutually_exclusive_group()
     option(
         track,
         "--track",
-        "the frames are a stream: confirm births, keep ids, smooth places, as a board does"
-        " (default: where they have times that ascend)",
+        "treat the frames as a stream: confirm new touches, keep ids, smooth places, as a board"
+        " does (default: if the frames have ascending times)",
     )
-    option(track, "--no-track", "each frame by itself")
+    option(track, "--no-track", "find the touches of each frame independently")
     option(
         parser,
         "--threads N",
-        "frames side by side, the same results; not with --warm or --track",
+        "solve N frames in parallel, with the same results; not with --warm or --track",
         default=1,
     )
-    option(parser, "--saturation-v V", "leave channels at or beyond +-V out", float)
+    option(parser, "--saturation-v V", "leave out rows at or beyond +-V", float)
     option(parser, "-o --output OUT.npz", "write images, touches and solver info", Output)
-    option(parser, "--picture FILE", "all frames, the truth where known (PNG, SVG, PDF)", Output)
-    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Output)
+    option(parser, "--picture FILE", "draw all frames, with known truth (PNG, SVG, PDF)", Output)
+    option(parser, "--film FILE", "show the frames one after another (WebP, GIF)", Output)
     option(parser, "--json")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Reconstruct all frames; those that cannot be used are named, and the others are still done
-    and written."""
+    """Reconstruct all frames. Frames that cannot be used are named, and the others are still
+    reconstructed and written."""
     changes: dict[str, Any] = {"sign": options.sign, "warm_start": options.warm}
     if options.second_pass:
         changes["second_pass"] = True
@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         model=options.model,
         engine=options.engine,
         changes=changes | named_solver(options),
-        target=named_target(options, "host"),
+        preset=read_preset(options, "host"),
         track=True if options.track else False if options.no_track else None,
         threads=options.threads,
         only=None if options.only is None else tuple(options.only.split(",")),

@@ -1,5 +1,5 @@
-"""``eitskin record``: every packet of a board into a file, for ``replay`` and for whoever has no
-board."""
+"""``eitskin record``: write every packet of a board to a file, for ``replay`` and for people
+without a board."""
 
 import argparse
 import sys
@@ -17,13 +17,13 @@ from eitskin.truth import observe_scene
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Take the reference, then write every packet of a board to a file as it comes, the"
-        " reference's raw frames included. A recording that is cut, even by kill -9, can be"
-        " read up to its last whole packet. Stop with Ctrl-C."
+        "Take the reference, then write every packet of a board to a file as it arrives, including"
+        " the raw frames of the reference. An interrupted recording, even after kill -9, can be"
+        " read up to its last complete packet. Stop with Ctrl-C."
     )
     add_device(parser)
     option(parser, "-o --output RUN.eits", None, Output, required=True)
-    option(parser, "--overwrite", "write over a file that exists")
+    option(parser, "--overwrite", "overwrite an existing file")
     add_stream(parser, "raw,image,touches")
     seconds = "stop after S seconds of the board's time"
     option(parser, "--seconds S", seconds, float, within=(above(0), 1e6))

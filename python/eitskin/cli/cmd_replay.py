@@ -1,5 +1,5 @@
-"""``eitskin replay``: a recording as it was streamed, as frames, or compared with this host's
-core."""
+"""``eitskin replay``: show a recording as it was streamed, export its frames, or compare its images
+with this host's core."""
 
 import argparse
 from pathlib import Path
@@ -20,21 +20,21 @@ from eitskin.truth import observe_scene
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Show a recording as  eitskin stream  showed it; write its raw frames as a frames file;"
-        " or put them through this host's core and compare every bit of the images and touches"
-        " with what the board sent."
+        "Show a recording as  eitskin stream  showed it; write its raw frames to a frames file; or"
+        " solve them with this host's core, and compare every bit of images and touches with what"
+        " the board sent."
     )
     option(parser, "recording RUN.eits", None, Path)
     option(
         parser, "--mode KIND[,KIND]", "raw, image, touches, events, or several (default: touches)"
     )
-    option(parser, "--first N", "the first N frames only", within=(1, 2**32 - 1))
+    option(parser, "--first N", "show only the first N frames", within=(1, 2**32 - 1))
     add_zones(parser)
-    option(parser, "--model MODEL.eitm", "the board's model where it is not the prebuilt one", Path)
-    option(parser, "--picture FILE", "images and touches, a panel a frame (PNG, SVG, PDF)", Output)
-    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Output)
+    option(parser, "--model MODEL.eitm", "the board's model if it is not the prebuilt one", Path)
+    option(parser, "--picture FILE", "draw a panel per frame (PNG, SVG, PDF)", Output)
+    option(parser, "--film FILE", "show the frames one after another (WebP, GIF)", Output)
     option(parser, "--frames OUT.npz", "write the raw frames for  reconstruct  and  doctor", Output)
-    option(parser, "--check", "solve again here and compare; exit code 10 where bits differ")
+    option(parser, "--check", "solve again here and compare; exit code 10 if bits differ")
     add_verbose(parser)
     option(parser, "--json", "print for programs")
     parser.set_defaults(run=run)
@@ -46,8 +46,8 @@ def run(options: argparse.Namespace) -> int:
         shown = (options.mode, options.picture, options.film, options.first)
         if any(one is not None for one in shown):
             raise UsageError(
-                "replay: --mode, --picture, --film and --first show a recording; leave them out"
-                " with --check and --frames"
+                "replay: --mode, --picture, --film and --first show a recording, while --check and"
+                " --frames do not; leave out one kind"
             )
         if options.frames is not None:
             _export(options)
@@ -89,13 +89,13 @@ def _check(options: argparse.Namespace) -> None:
     check, noted = check_recording(options.recording, options.model)
     if not check.compared:
         raise FrameError(
-            f"{options.recording}: nothing to compare: it takes a recording of raw frames and"
-            " images or touches, from the tare on, as  eitskin record  makes by default"
+            f"{options.recording}: nothing to compare: the recording must hold raw frames, and"
+            " images or touches, from the tare on, as  eitskin record  makes it by default"
         )
     facts = {"recording": str(options.recording), "solver_noted": noted}
     answer(options, facts | check.as_dict(), check.text())
     if check.different:
-        why = "; the recording does not note the solver's options, so the model's own were taken"
+        why = "; the recording does not hold the solver's options, so the model's own were used"
         raise VerificationError(
-            f"{options.recording}: this host's images are not the board's{'' if noted else why}"
+            f"{options.recording}: this host's images differ from the board's{'' if noted else why}"
         )

@@ -14,19 +14,19 @@ from eitskin.view.scene_pictures import draw_scene
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "A scene file says what happens on a skin and which imperfections take part;"
-        " docs/guide/scenes.md."
+        "A scene file describes what happens on a skin, and with which imperfections it is"
+        " measured (docs/guide/scenes.md)."
     )
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
-    one = what.add_parser("run", help="simulate a scene: frames with their truth")
+    one = what.add_parser("run", help="simulate a scene, and write frames with their truth")
     option(one, "scene SCENE", SCENE_HELP)
     option(one, "-o --output FRAMES", "frames file to write (.npz)", Output, required=True)
-    pixels = "of mask and conductivity; 0: none (default: %(default)s)"
+    pixels = "pixels of mask and conductivity, 0 for none (default: %(default)s)"
     option(one, "--truth-pixels N", pixels, default=64)
     option(one, "--json")
     one.set_defaults(run=run_scene)
     plan = what.add_parser(
-        "plan", help="what a scene will compute, step by step, and what that costs"
+        "plan", help="show what a scene will compute, step by step, and the cost"
     )
     option(plan, "scene SCENE", SCENE_HELP)
     option(plan, "--json")
@@ -37,11 +37,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(picture, "scene SCENE", SCENE_HELP)
     option(picture, "-o --output FILE", None, Output, required=True)
     picture.set_defaults(run=run_picture)
-    names = what.add_parser("list", help="the scenes that come with the package")
+    names = what.add_parser("list", help="list the scenes that ship with the package")
     option(names, "--json")
     names.set_defaults(run=run_list)
     effects = what.add_parser(
-        "effects", help="the effects that a scene can name, or one effect's parameters"
+        "effects", help="list the effects that a scene can name, or the parameters of one"
     )
     option(effects, "name NAME", "an effect", nargs="?")
     option(effects, "--json")

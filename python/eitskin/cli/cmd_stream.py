@@ -1,5 +1,5 @@
-"""``eitskin stream``: a board's touches, images or raw frames as they come, and what they amounted
-to."""
+"""``eitskin stream``: show a board's touches, images or raw frames as they arrive, and a
+summary."""
 
 import argparse
 
@@ -24,18 +24,17 @@ from eitskin.truth import observe_scene
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Follow a board: its touches as a table on standard output, with a line a gesture,"
-        " faults and events of the"
-        " link on standard error, a summary at the end. What is seen on a simulated or emulated"
-        " board is compared with its scene's truth. With --json each line is a JSON object,"
-        " the last one the summary (docs/reference/message.md)."
+        "Show the touches of a board as a table on standard output, with a line per gesture; show"
+        " faults and events of the link on standard error; print a summary at the end. Touches of"
+        " a simulated or emulated board are compared with the truth of its scene. With --json each"
+        " line is a JSON object, and the last one is the summary (docs/reference/message.md)."
     )
     add_device(parser)
     add_stream(parser, "touches")
-    option(parser, "--picture FILE", "images and touches, a panel a frame (PNG, SVG, PDF)", Output)
-    option(parser, "--film FILE", "show them one after another (WebP, GIF)", Output)
-    option(parser, "--record RUN.eits", "also record every packet, as  eitskin record", Output)
-    option(parser, "--overwrite", "write over files that exist, of --record and --to")
+    option(parser, "--picture FILE", "draw a panel per frame (PNG, SVG, PDF)", Output)
+    option(parser, "--film FILE", "show the frames one after another (WebP, GIF)", Output)
+    option(parser, "--record RUN.eits", "also record every packet, like  eitskin record", Output)
+    option(parser, "--overwrite", "overwrite existing files of --record and --to")
     add_zones(parser)
     add_outputs(parser)
     add_verbose(parser)

@@ -1,4 +1,4 @@
-"""``eitskin tare``: the reference from the untouched skin."""
+"""``eitskin tare``: take the reference from the untouched skin."""
 
 import argparse
 
@@ -10,12 +10,12 @@ from eitskin.device.client import TARE_FRAMES, check_tare_frames
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Take a board's reference frame from its untouched skin; four frames or more also tell"
-        " it the noise. It is kept until the board is reset, the scan is changed or another"
-        " model comes."
+        "Take a board's reference frame from its untouched skin; four frames or more also give the"
+        " noise. The board keeps the reference until it is reset, the scan is changed, or another"
+        " model is uploaded."
     )
     add_device(parser)
-    option(parser, "--frames N", "1, or 4 to 1024", int, default=TARE_FRAMES)
+    option(parser, "--frames N", "number of frames: 1, or 4 to 1024", int, default=TARE_FRAMES)
     parser.set_defaults(run=run)
 
 

@@ -1,5 +1,5 @@
-"""``eitskin teach ACTION``: a model learned from presses at known places. One file an action beside
-this one, ``teach_ACTION``, with ``add_parser(actions)``."""
+"""``eitskin teach ACTION``: learn a model from presses at known places. Each action has a module
+``teach_ACTION`` beside this one, with ``add_parser(actions)``."""
 
 import argparse
 import importlib
@@ -9,8 +9,8 @@ ACTIONS = ("plan", "record", "fit", "update", "check")
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Learn a skin's model from presses at known places: no sign, gain, order of"
-        " channels or exact geometry is needed. docs/guide/teaching.md shows how."
+        "Learn a skin's model from presses at known places. Sign, gain, channel order and exact"
+        " geometry need not be known. docs/guide/teaching.md shows how."
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     for name in ACTIONS:

@@ -1,4 +1,4 @@
-"""``eitskin view``: the live page in a browser."""
+"""``eitskin view``: show a board live on a page in a browser."""
 
 import argparse
 import ipaddress
@@ -33,42 +33,45 @@ PORT = 8470
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Serve a page that shows a board live, and say its address. Simulated and recorded"
-        " frames come at the speed that they were scanned at, or as ?speed=2 or ?speed=max"
-        " after the device says; ?loop=1 begins again at the end. Ctrl-C ends it."
+        "Serve a page that shows a board live, and print its address. Simulated and recorded"
+        " frames run at the speed of their scan; add ?speed=2 or ?speed=max to the device to"
+        " change that, and ?loop=1 to repeat them. Stop with Ctrl-C."
     )
     add_device(parser, json=False)
     option(
         parser,
         "--mode KIND[,KIND]",
-        "raw, image, touches, or several (default: all; of a real board image,touches)",
+        "raw, image, touches, or several (default: all; for a real board image,touches)",
     )
     add_report(parser)
     add_every(parser)
-    option(parser, "--port PORT", "to listen on; 0 for any", default=PORT, within=(0, 65535))
+    option(parser, "--port PORT", "port to listen on; 0: any", default=PORT, within=(0, 65535))
     option(
         parser,
         "--host ADDRESS",
-        "to listen on, such as 0.0.0.0; other than this machine needs --token",
+        "address to listen on, such as 0.0.0.0; access from other machines needs --token",
         default="127.0.0.1",
     )
     option(
-        parser, "--token WORD", "that commands need (default: drawn at the start, in the address)"
+        parser,
+        "--token WORD",
+        "password for commands (default: a random one, in the address)",
     )
-    option(parser, "--folder FOLDER", "where the page's recordings go", Path, default=Path())
+    option(parser, "--folder FOLDER", "folder for the page's recordings", Path, default=Path())
     option(
-        parser, "--teach PLAN.csv", "guide through presses of  teach plan  beside the skin", Path
+        parser, "--teach PLAN.csv", "guide through the presses of  teach plan  on the page", Path
     )
     option(
         parser,
         "--presses PRESSES.npz",
-        "where those go, and go on (default: presses.npz in --folder); the model goes beside them",
+        "file for these presses, continued if it exists (default: presses.npz in --folder); the"
+        " model is written beside it",
         Path,
     )
-    option(parser, "--skin SKIN.toml", "of --teach (default: that of the board's model)", Path)
+    option(parser, "--skin SKIN.toml", "skin for --teach (default: the board model's)", Path)
     add_outputs(parser)
     add_zones(parser)
-    option(parser, "--overwrite", "write over files that exist, of --to")
+    option(parser, "--overwrite", "overwrite existing files of --to")
     option(parser, "--open", "open the page in this machine's browser")
     add_scan(parser)
     parser.set_defaults(run=run)
@@ -81,14 +84,14 @@ def run(options: argparse.Namespace) -> int:
     remote = not _this_machine(options.host)
     if remote and options.token is None:
         raise UsageError(
-            f"--host {options.host}: who may look on from elsewhere must know a word; name it with"
+            f"--host {options.host}: access from other machines needs a password; set it with"
             f"  --token WORD, at least {MIN_TOKEN} characters"
         )
     if not options.folder.is_dir():
         raise FileError(f"--folder {options.folder}: no such folder; make it, or name another")
     options.frames = None
     named = options.mode or ("raw,touches" if options.teach is not None else None)
-    mode = None if named is None else read_mode(named)  # None: what the kind of device can send
+    mode = None if named is None else read_mode(named)  # None: chosen by the kind of device
     settings = replace(session_settings(options, mode), quiet_frames=True)
     token = options.token or secrets.token_urlsafe(16)
     server = PageServer(

@@ -1,4 +1,5 @@
-"""A frame in one line, for reading: touches, places in the image, raw rows in brief."""
+"""Format a frame as one line of text: its touches, places in the image, and a summary of its raw
+rows."""
 
 from collections import Counter
 
@@ -10,7 +11,7 @@ from eitskin.session.frame import Frame
 
 
 def line(frame: Frame, *, solver: bool = True) -> str:
-    """A frame in a line, with or without what the solver says of it."""
+    """Return a line of text for a frame, with the solver's information if ``solver`` is set."""
     parts = [_touches_text(frame), _image_text(frame), _raw_text(frame)]
     if solver:
         parts.append(_solve_text(frame))

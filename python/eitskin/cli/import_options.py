@@ -1,4 +1,4 @@
-"""The options that say what somebody else's frames are; ``import`` and ``doctor`` share them."""
+"""The options of ``import`` and ``doctor`` that describe the frames of another instrument."""
 
 import argparse
 from dataclasses import fields, replace
@@ -20,22 +20,22 @@ ORDERS = ("fixed", "rotating", "fixed-all", "rotating-all", "table")
 
 
 def add_import_options(parser: argparse.ArgumentParser) -> None:
-    """Add all of them to ``parser``; defaults change nothing."""
-    known = parser.add_argument_group("a layout: all of these in a file")
-    option(known, "--layout FILE", "how lines are frames (TOML); other options go before it", Path)
-    option(known, "--save-layout FILE", "write that, for import and text: boards", Output)
+    """Add all of them to ``parser``; the defaults change nothing."""
+    known = parser.add_argument_group("layout: all of these options in a file")
+    option(known, "--layout FILE", "read a layout (TOML); other options override it", Path)
+    option(known, "--save-layout FILE", "write a layout, for import and text: boards", Output)
     _add_protocol(parser.add_argument_group("protocol: the order of the result"))
-    _add_place(parser.add_argument_group("where the frames are in the source"))
-    _add_repairs(parser.add_argument_group("what differs in the source, and what to repair"))
-    _add_truth(parser.add_argument_group("truth that an NPZ or MAT source brings along"))
+    _add_place(parser.add_argument_group("place of the frames in the source"))
+    _add_repairs(parser.add_argument_group("differences of the source, and repairs"))
+    _add_truth(parser.add_argument_group("truth in an NPZ or MAT source"))
 
 
 def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | None, int | None]:
-    """The wanted protocol (None: the source's own table), the skin where one is given, the number
-    of electrodes.
+    """Return the protocol of the result (None: the source's own table), the skin if one is given,
+    and the number of electrodes.
 
     Raises:
-        UsageError: options that contradict each other.
+        UsageError: options contradict each other.
         EitskinError: the skin file cannot be read.
     """
     skin, protocol = load_skin(options.skin) if options.skin is not None else (None, None)
@@ -52,8 +52,8 @@ def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | 
             protocol, count = layout.protocol, layout.protocol.n_electrodes
         if count != layout.protocol.n_electrodes:
             raise UsageError(
-                f"{options.layout} is of {layout.protocol.n_electrodes} electrodes, not of {count};"
-                " leave --skin and --electrodes out, or take another layout"
+                f"{options.layout} is for {layout.protocol.n_electrodes} electrodes, not {count};"
+                " leave out --skin and --electrodes, or use another layout"
             )
     if options.protocol is None or options.protocol == "table":
         return protocol, skin, count
@@ -69,11 +69,11 @@ def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | 
 
 
 def read_options(options: argparse.Namespace) -> ImportOptions:
-    """The import options of a command line."""
+    """Return the import options of a command line."""
     named = vars(options)
-    # what no option names (comments) is at its default
-    said = {f.name: named[f.name] for f in fields(SourceOptions) if f.name in named}
-    source = SourceOptions(**said)
+    # fields without an option (comments) keep their defaults
+    given_source = {f.name: named[f.name] for f in fields(SourceOptions) if f.name in named}
+    source = SourceOptions(**given_source)
     extent = options.truth_mask_extent
     truth = TruthOptions(
         touch_frame=options.truth_frame,
@@ -108,18 +108,18 @@ def read_options(options: argparse.Namespace) -> ImportOptions:
 
 
 def read_layout(options: argparse.Namespace) -> Layout | None:
-    """The layout that ``--layout`` names; None without it."""
+    """Return the layout that ``--layout`` names, or None."""
     return None if options.layout is None else load_layout(options.layout)
 
 
 def write_layout(path: Path, source: Path, named: ImportOptions, protocol: Protocol | None) -> None:
-    """Write how ``source`` is read by the options ``named`` as a layout."""
+    """Write a layout that reads ``source`` as the options ``named`` do."""
     raw = read_source(source, named.source, *accepted_counts(named, protocol))
     save_layout(path, layout_of(raw, named, protocol, str(source)))
 
 
 def _over(base: Any, given: Any) -> Any:
-    """``base`` with what of ``given`` is not at its default."""
+    """Return ``base`` with those values of ``given`` that differ from their defaults."""
     default = type(given)()
     pairs = ((f.name, getattr(given, f.name)) for f in fields(given))
     named = {name: value for name, value in pairs if value != getattr(default, name)}
@@ -127,7 +127,8 @@ def _over(base: Any, given: Any) -> Any:
 
 
 def whole_numbers(text: str | None, option: str) -> tuple[int, ...]:
-    """ "3,17,20:24" as numbers (a range without its end), empty for None."""
+    """Return the integers in a text such as "3,17,20:24" (a range excludes its end); empty for
+    None."""
     numbers: list[int] = []
     for part in () if text is None else text.split(","):
         first, colon, last = part.partition(":")
@@ -135,12 +136,12 @@ def whole_numbers(text: str | None, option: str) -> tuple[int, ...]:
             start = int(first)
             numbers.extend(range(start, int(last)) if colon else [start])
         except ValueError:
-            raise UsageError(f"{option} {text}: {part!r} is no whole number or range a:b") from None
+            raise UsageError(f"{option} {text}: {part!r} is not an integer or range a:b") from None
     return tuple(dict.fromkeys(numbers))
 
 
 def floats(text: str, option: str) -> tuple[float, ...]:
-    """ "1.5,-2" as numbers."""
+    """Return the numbers in a text such as "1.5,-2"."""
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -169,85 +170,86 @@ def _add_protocol(group: Any) -> None:
     option(
         group,
         "--protocol",
-        "table: keep the source's own",
+        "table: keep the source's own table",
         choices=("adjacent", "opposite", "skip", "table"),
     )
-    option(group, "--skip K", "electrodes skipped, with --protocol skip", int)
-    option(group, "--electrodes N", "number of electrodes, where no skin says so", int)
-    option(group, "--current-a A", "drive current in A, instead of the protocol's", float)
+    option(group, "--skip K", "electrodes to skip, with --protocol skip", int)
+    option(group, "--electrodes N", "number of electrodes, if no skin is given", int)
+    option(group, "--current-a A", "drive current in A (default: the protocol's)", float)
 
 
 def _add_place(group: Any) -> None:
     option(group, "--voltage KEY", "NPZ, MAT: array of the frames")
-    option(group, "--reference KEY", "NPZ, MAT: array of the quiet frame or frames")
+    option(group, "--reference KEY", "NPZ, MAT: array of the untouched frame or frames")
     option(
-        group, "--columns LIST", "text: the voltages' columns, from 0: 2, 1:209, 0:416:2, or names"
+        group, "--columns LIST", "text: columns of voltages, from 0: 2, 1:209, 0:416:2, or names"
     )
-    option(group, "--reference-columns LIST", "text: columns of the quiet frames")
-    option(group, "--reference-frames LIST", "which of the frames are the quiet ones, as in 0:20")
+    option(group, "--reference-columns LIST", "text: columns of the untouched frames")
+    option(group, "--reference-frames LIST", "numbers of the untouched frames, such as 0:20")
     option(group, "--names KEY", "NPZ, MAT: array of the frames' names")
     option(group, "--time KEY", "array or column of the frames' times in s")
-    option(group, "--time-scale FACTOR", "times the source's times gives seconds", default=1.0)
+    option(group, "--time-scale FACTOR", "seconds per unit of the source's times", default=1.0)
     sides = ("auto", "rows", "columns")
-    option(group, "--frames-in", "needed only where both fit", choices=sides, default="auto")
+    option(group, "--frames-in", "needed only if both fit", choices=sides, default="auto")
     parts = ("real", "imag", "abs", "in-phase")
-    option(group, "--complex-part", "of complex numbers; in text, of column pairs", choices=parts)
-    option(group, "--pairs", "what column pairs are; else as the header says", choices=PAIRS)
-    option(group, "--scale FACTOR", "times the source's numbers gives volts; 1 for volts", float)
+    part = "part of complex numbers to keep; in text, of pairs of columns"
+    option(group, "--complex-part", part, choices=parts)
+    option(group, "--pairs", "meaning of pairs of columns (default: from header)", choices=PAIRS)
+    option(group, "--scale FACTOR", "volts per unit of the source's numbers; 1 for volts", float)
     option(
         group,
         "--delimiter WORD",
-        "comma, semicolon, tab, bar, space, a character, or decimals:N (none; each number has N"
-        " decimals); else found",
+        "comma, semicolon, tab, bar, space, a character, or decimals:N (no delimiter; each number"
+        " has N decimals); default: detected",
     )
-    option(group, "--label WORD", "text: frames are the lines that begin with it; else found")
-    option(group, "--header-rows N", "rows before the numbers; else found", int)
-    option(group, "--skip-bad-lines", "leave lines of another length than most out")
+    option(group, "--label WORD", "text: frames are the lines with this label (default: detected)")
+    option(group, "--header-rows N", "rows before the numbers (default: detected)", int)
+    option(group, "--skip-bad-lines", "leave out lines whose length differs from most")
 
 
 def _add_repairs(group: Any) -> None:
-    option(group, "--order", "how the source lists its channels", choices=ORDERS, default="fixed")
+    option(group, "--order", "order of the source's channels", choices=ORDERS, default="fixed")
     option(group, "--table-file FILE", "text table of the source's rows: I+, I-, V+, V-")
     option(group, "--protocol-table KEY", "NPZ, MAT: array with that table")
-    option(group, "--table-base N", "the table's number of the first electrode", default=0)
+    option(group, "--table-base N", "number of the first electrode in the table", default=0)
     signs = ("signed", "reversed", "magnitude")
     option(
         group,
         "--sign",
-        "magnitude: signs from the homogeneous prediction",
+        "reversed: negate; magnitude: take signs from the homogeneous prediction",
         choices=signs,
         default="signed",
     )
     option(group, "--rotate K", "the source's first electrode is electrode K", default=0)
     turned = group.add_mutually_exclusive_group()
-    option(turned, "--mirror", "the source numbers its electrodes the other way round")
-    text = "the source numbers clockwise: mirror it unless the skin does"
+    option(turned, "--mirror", "the source numbers its electrodes in the other direction")
+    text = "the source numbers clockwise; mirror it unless the skin does too"
     option(turned, "--clockwise", text)
     group.add_argument(
         "--swap",
         action="append",
         default=[],
         metavar="I,J",
-        help="wires of these electrodes are exchanged",
+        help="the wires of these electrodes are exchanged; can be repeated",
     )
     option(
         group, "--flip-channels LIST", "change the sign of these channels (numbers in our order)"
     )
     option(group, "--impute-channels LIST", "fill these channels from their reciprocals")
     option(
-        group, "--drop-channels LIST", "leave these channels out (the result is a table protocol)"
+        group, "--drop-channels LIST", "leave out these channels (the result is a table protocol)"
     )
     option(group, "--drop-electrodes LIST", "leave out all channels of these electrodes")
     option(group, "--equalise", "give each channel the gain of the homogeneous prediction")
 
 
 def _add_truth(group: Any) -> None:
-    option(group, "--truth-frame KEY", "touches: frame of each, as a number from 0 or a name")
+    option(group, "--truth-frame KEY", "touches: their frames, as numbers from 0 or names")
     option(group, "--truth-xy KEY", "touches: centres (t, 2)")
     option(group, "--truth-radius KEY", "touches: radii (t,)")
-    option(group, "--truth-sign KEY", "touches: true or above 0 where more conductive")
+    option(group, "--truth-sign KEY", "touches: true or above 0 if more conductive")
     option(group, "--truth-strength KEY", "touches: relative conductivity change")
-    option(group, "--truth-unit-mm MM", "mm in a unit of centres and radii", default=1.0)
+    option(group, "--truth-unit-mm MM", "mm per unit of centres and radii", default=1.0)
     option(group, "--truth-mask KEY", "masks (frames, rows, columns) of +1, -1, 0")
-    option(group, "--truth-mask-extent X,Y,X,Y", "the masks' box in mm; else the skin's")
+    option(group, "--truth-mask-extent X,Y,X,Y", "box of the masks in mm (default: the skin's)")
     option(group, "--truth-mask-top-first", "row 0 of a mask is the top, not the bottom")

@@ -1,4 +1,4 @@
-"""Printing a board's frames as they come, and their summary; ``stream`` and ``replay`` share it."""
+"""Print a board's frames as they arrive, and their summary; shared by ``stream`` and ``replay``."""
 
 import argparse
 from typing import Any
@@ -23,10 +23,10 @@ SCORED = "  off mm"
 
 
 def check_drawn(options: argparse.Namespace, what: Stream) -> None:
-    """Refuse ``--picture`` and ``--film`` of what cannot be drawn, before anything is done for it.
+    """Check that ``--picture`` and ``--film`` can be drawn, before anything else is done.
 
     Raises:
-        UsageError: neither images nor touches are asked for, or a name says no format.
+        UsageError: neither images nor touches are streamed, or a name has an unknown format.
         MissingExtraError: matplotlib is not installed.
     """
     if options.picture is None and options.film is None:
@@ -42,14 +42,14 @@ def check_drawn(options: argparse.Namespace, what: Stream) -> None:
 
 
 class Rows:
-    """Frames for reading: with ``verbose`` a line a frame with all that is known of it; else
-    touches in a table, a row each, and other frames in brief."""
+    """Formats frames as text: with ``verbose`` one line per frame with everything known about it;
+    otherwise touches in a table, one row each, and other frames in brief."""
 
     def __init__(self, verbose: bool, scored: bool) -> None:
         self._verbose, self._scored, self._begun = verbose, scored, False
 
     def lines(self, message: Frame | DriveReport) -> list[str]:
-        """Of the next frame, or of touches after a drive."""
+        """Return the lines for the next frame, or for touches after a drive."""
         if isinstance(message, DriveReport):
             return self.moving(message)
         return [*self._frame(message), *_happened(message)]
@@ -76,7 +76,7 @@ class Rows:
         return rows
 
     def moving(self, report: DriveReport) -> list[str]:
-        """Of touches after a drive: where they are, and how fast they go."""
+        """Return the lines for touches after a drive: their places and velocities."""
         time = f"{report.time_s:8.4f}"
         return [
             f"{time}  drive {report.drive:2d}: touch {one.id} at {one.x_mm:.1f},"
@@ -92,13 +92,14 @@ class Rows:
 
 
 def _happened(frame: Frame) -> list[str]:
-    """A line a gesture, and a zone pressed; what moves on is left to --json."""
+    """Return a line for each gesture and each zone that is pressed; continuous changes appear only
+    with --json."""
     return [f"{frame.time_s:8.3f}  {one.text()}" for one in frame.events if one.is_gesture]
 
 
 def show(options: argparse.Namespace, session: Session, outputs: Outputs | None = None) -> None:
-    """Print every message of ``session``, draw ``--picture`` and ``--film``, print the summary with
-    the counts of ``outputs``; Ctrl-C ends it in good order."""
+    """Print every message of ``session``, draw ``--picture`` and ``--film``, and print the summary
+    with the counts of ``outputs``. Ctrl-C ends it cleanly."""
     album, broken = Album(), None
     rows = Rows(options.verbose, session.observer is not None)
     messages = session.messages()
@@ -118,7 +119,7 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
         broken = error
         session.summary.link = session.device.counters.as_dict()
     finally:
-        messages.close()  # the board gets its stop before it is asked what it counted
+        messages.close()  # stops the board before it is asked for its counters
     if broken is None:
         session.finish()
     if album.count and session.known is not None:

@@ -1,5 +1,5 @@
-"""The command line: ``eitskin COMMAND``. One file a command beside this one; only that of the
-command that is named is imported."""
+"""The command line: ``eitskin COMMAND``. Each command has its own module beside this one, and only
+that of the given command is imported."""
 
 import argparse
 import importlib
@@ -17,54 +17,56 @@ from eitskin.cli.arguments import option, refuse_named_twice
 from eitskin.config import nearest
 from eitskin.errors import EitskinError, FileError, UsageError, missing_checkout
 
-COMMANDS = {  # each with what it does
-    "demo": "three simulated touches, reconstructed in C, beside the truth",
+COMMANDS = {  # the description of each command
+    "demo": "reconstruct three simulated touches in C, and compare them with the truth",
     "model": "build, describe, verify or upload an .eitm model",
-    "reconstruct": "touches and images of the frames in a file",
-    "import": "turn a text, NPY, NPZ or MAT file of measured voltages into a frames file",
-    "export": "a model, frames and their images as a .mat file for EIDORS",
-    "doctor": "say what is wrong with measured frames or a board: order, sign, wiring, noise,"
-    " gains",
+    "reconstruct": "reconstruct touches and images from the frames in a file",
+    "import": "convert a text, NPY, NPZ or MAT file of measured voltages to a frames file",
+    "export": "write a model, frames and their images to a .mat file for EIDORS",
+    "doctor": "find out what is wrong with frames or a board: order, sign, wiring, noise, gains",
     "scene": "simulate what happens on a skin, with the imperfections that a scene names",
-    "calibrate": "known weights on a skin, so that its touches come in grams",
-    "teach": "a model learned from presses at known places",
-    "recommend": "what to choose for a time or an accuracy, and its model",
-    "devices": "serial ports, boards that answer, and how simulated ones are named",
-    "info": "what a board is, its model, its scan, its faults and statistics",
-    "board": "the owner's settings of a board: lock, current, limit",
+    "calibrate": "calibrate the force of touches with known weights on the skin",
+    "teach": "learn a model from presses at known places",
+    "recommend": "choose settings for a time or an accuracy, and build a model with them",
+    "devices": "list serial ports, boards that answer, and names of other devices",
+    "info": "show what a board is, its model, its scan, its faults and its counters",
+    "board": "show or change the owner's settings of a board: lock, current, limit",
     "tare": "take a board's reference from its untouched skin",
-    "view": "the skin live in a browser: image, touches, electrodes, voltages",
-    "stream": "touches, images or raw frames of a board as they come",
+    "view": "show the skin live in a browser: image, touches, electrodes, voltages",
+    "stream": "show touches, images or raw frames of a board as they arrive",
     "record": "write every packet of a board to a file",
     "replay": "show a recording, export its frames, or check its images",
     "flash": "put firmware and a model on a NUCLEO-F767ZI",
-    "completion": "a script with which your shell completes commands and options",
+    "completion": "print a script with which your shell completes commands and options",
 }
 FIRST = "eitskin stream --device sim:swipe"
-INVALID_CHOICE = re.compile(  # as argparse words it, quoted before Python 3.12
+INVALID_CHOICE = re.compile(  # argparse's text, with quotes before Python 3.12
     r"argument (?P<what>.*?): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)"
 )
-ENTRY_POINT_GROUP = "eitskin.commands"  # of other packages
-STUDIES = ("bench", "compare", "dataset", "draw", "study", "tradeoff")  # of eitskin-studies
+REPLACED = re.compile(r"unrecognized arguments: .*--(budget|accuracy)\b")
+ENTRY_POINT_GROUP = "eitskin.commands"  # commands of other packages
+STUDIES = ("bench", "compare", "dataset", "draw", "study", "tradeoff")  # in eitskin-studies
 
 
 class Parser(argparse.ArgumentParser):
-    """What cannot be parsed is refused in one line, as everything else is."""
+    """A parser that reports errors in one line, like all other errors."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise UsageError instead of printing the usage and leaving; a choice that is none gets
-        the nearest one."""
+        """Raise a UsageError instead of printing the usage and exiting. For an invalid choice,
+        suggest the nearest one."""
         found = INVALID_CHOICE.fullmatch(message)
         if found:
             known = re.findall(r"'([^']+)'", found["known"]) or found["known"].split(", ")
             message = f"{found['what']}: {found['given']!r} is unknown; "
             message += nearest(found["given"], known)
+        if REPLACED.match(message):
+            message += "; use --preset, or a model of  eitskin recommend -o MODEL.eitm"
         see = " See" if message.endswith("?") else "; see"
         raise UsageError(f"{message}{see}  {self.prog} --help")
 
 
 def build_parser(only: str | None = None) -> argparse.ArgumentParser:
-    """The whole parser, or that in which of our commands ``only`` one has options; each module
+    """Return the whole parser, or one in which only the command ``only`` has options. Each module
     ``cmd_NAME`` has ``add_options(parser)``, which sets ``run``."""
     parser = Parser(
         prog="eitskin", description="Electrical impedance tomography skins, from model to touches."
@@ -85,13 +87,13 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
 
 
 def named_command(arguments: Sequence[str]) -> str:
-    """The word that names the command; "" where none does."""
+    """Return the word that names the command, or ""."""
     return next((one for one in arguments if not one.startswith("-")), "")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code (docs/reference/error-codes.md) and prints errors as
-    one line on stderr."""
+    """Run one command and return its exit code (docs/reference/error-codes.md). Errors are printed
+    as one line on stderr."""
     traceback = False
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
@@ -117,18 +119,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 0
-    except OSError as error:  # most of all a full disk behind standard output
+    except OSError as error:  # usually a full disk behind standard output
         if traceback:
             raise
-        _say_last(f"{error.filename or 'output'}: {error.strerror or error}")
+        _print_last(f"{error.filename or 'output'}: {error.strerror or error}")
         return FileError.exit_code
     except KeyboardInterrupt:
         print("eitskin: stopped", file=sys.stderr)
         return 130
 
 
-def _say_last(text: str) -> None:
-    """Say why it ends, and drop what standard output still holds, which would fail again."""
+def _print_last(text: str) -> None:
+    """Print the reason for the end, and discard what standard output still buffers, which would
+    fail again."""
     with suppress(OSError, ValueError, AttributeError):
         print(f"eitskin: {text}", file=sys.stderr, flush=True)
     with suppress(OSError, ValueError, AttributeError):

@@ -1,5 +1,5 @@
-"""How far long work is, and how long it still takes: bars on stderr where that is a terminal, a
-line every ten seconds elsewhere."""
+"""Progress of long work: bars on stderr if that is a terminal, otherwise a line every ten
+seconds."""
 
 import sys
 import time
@@ -12,7 +12,8 @@ LINE_S = 10.0
 
 
 def bar(what: str) -> Callable[..., Iterable[Any]]:
-    """Wraps items, and where they have no length their number, with a bar of ``what``."""
+    """Return a function that wraps items with a progress bar labelled ``what``; if the items have
+    no length, it takes their number too."""
 
     def shown(items: Iterable[Any], total: int | None = None) -> Iterable[Any]:
         number = len(items) if total is None and isinstance(items, Sized) else total
@@ -25,7 +26,7 @@ def bar(what: str) -> Callable[..., Iterable[Any]]:
 
 
 def named_bar(items: Iterable[Any], what: str) -> Iterable[Any]:
-    """``items`` with a bar of ``what``."""
+    """Wrap ``items`` with a progress bar labelled ``what``."""
     return bar(what)(items)
 
 
@@ -36,17 +37,17 @@ def lines(
     clock: Callable[[], float] = time.monotonic,
     weight: Callable[[Any], int] = lambda item: 1,
 ) -> Iterator[Any]:
-    """``items``; every ten seconds a line on stderr says how many are done, of ``total``, and how
-    long the rest takes. ``weight``: how many an item counts for."""
-    start = said = clock()
+    """Yield ``items``, and every ten seconds print a line on stderr with how many are done, of
+    ``total``, and the remaining time. ``weight`` gives how many an item counts for."""
+    start = printed = clock()
     done = 0
     for item in items:
         yield item
         done += weight(item)
         now = clock()
-        if now - said < LINE_S:
+        if now - printed < LINE_S:
             continue
-        said = now
+        printed = now
         rest = "" if total is None else f" of {total}"
         if total is not None and 0 < done <= total:
             left = tqdm.format_interval((now - start) * (total - done) / done)

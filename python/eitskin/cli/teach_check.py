@@ -1,5 +1,5 @@
-"""``eitskin teach check MODEL [FRAMES]``: whether a taught model still fits, from the untouched
-skin alone."""
+"""``eitskin teach check MODEL [FRAMES]``: check from the untouched skin alone whether a taught
+model still fits."""
 
 import argparse
 import zipfile
@@ -24,33 +24,33 @@ from eitskin.teaching.presses import load_presses
 from eitskin.teaching.still import still_fits
 
 REMEDY = {
-    "fits": "tare, and touch",
+    "fits": "tare, then use it",
     "update": "make 5 to 20 presses and run  eitskin teach update",
-    "teach again": "look at the electrodes, then teach again",
+    "teach again": "check the electrodes, then teach again",
 }
 
 
 def add_parser(actions: Any) -> None:
     parser = actions.add_parser(
         "check",
-        help="whether a taught model still fits, from the untouched skin alone",
+        help="check from the untouched skin alone whether a taught model still fits",
         description=(
-            "Compare the untouched skin with what it was when it was taught, and say whether the"
-            " model fits, wants an update, or is to be taught again. Places that were turned or"
-            " shifted are not seen by it: after remounting make 5 presses and update."
+            "Compare the untouched skin with its state when it was taught, and state whether the"
+            " model fits, needs an update, or must be taught again. A turned or shifted skin is not"
+            " detected: after remounting, make 5 presses and update."
         ),
     )
     option(parser, "model MODEL.eitm", "from  eitskin teach fit  or  update", Path)
     option(
         parser,
         "frames FRAMES.npz",
-        "the quiet frames of a frames file, or the untouched ones of presses; without it a board"
-        " whose skin nobody touches is asked",
+        "untouched frames of a frames file or of presses (default: from a board whose skin is not"
+        " touched)",
         Path,
         nargs="?",
     )
     add_device(parser, model=False)
-    option(parser, "--firmware BIN", "of an emulated board (default: the prebuilt one)", Path)
+    option(parser, "--firmware BIN", "firmware of an emulated board (default: prebuilt)", Path)
     parser.set_defaults(run=run)
 
 
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
         options,
         {"frames": len(untouched), **asdict(found)},
         f"{options.model}: {found.verdict} ({found.rule}); {REMEDY[found.verdict]}",
-        f"correlation with the frame taught {found.correlation:.4f}, distance"
+        f"correlation with the taught frame {found.correlation:.4f}, distance"
         f" {found.distance:.2f} presses, {len(untouched)} frames",
     )
 
@@ -92,5 +92,5 @@ def _of_board(options: argparse.Namespace) -> tuple[np.ndarray, Protocol]:
             if isinstance(message, Frame) and message.raw is not None
         ]
     if not frames:
-        raise DeviceError(f"{options.device}: no frame came; look at it with  eitskin info")
+        raise DeviceError(f"{options.device}: no frame came; check it with  eitskin info")
     return np.array(frames), protocol

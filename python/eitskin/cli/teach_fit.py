@@ -1,4 +1,4 @@
-"""``eitskin teach fit PRESSES -o MODEL``: the model and its report."""
+"""``eitskin teach fit PRESSES -o MODEL``: fit a model to presses, and report its errors."""
 
 import argparse
 from pathlib import Path
@@ -17,27 +17,27 @@ from eitskin.teaching.teach import teach
 from eitskin.view.panels import check_picture
 from eitskin.view.taught_picture import draw_taught
 
-NEXT = "{}: tare, then touches; eitskin model upload sends it to a board"
+NEXT = "{}: tare before use; eitskin model upload sends it to a board"
 
 
 def add_parser(actions: Any) -> None:
-    parser = actions.add_parser("fit", help="presses to a model, with what it is worth")
+    parser = actions.add_parser("fit", help="fit a model to presses, and report its errors")
     option(parser, "presses PRESSES.npz", "from  eitskin teach record", Path)
     option(parser, "-o --output MODEL.eitm", None, Output, required=True)
     option(parser, "--skin SKIN.toml", "default: the description in the presses' file", Path)
     option(
         parser,
         "--place-sd MM",
-        "how far places given by hand may be off, an axis; they are refined",
+        "standard deviation per axis of places given by hand; the fit then refines them",
         default=0.0,
     )
     option(
         parser,
         "--reference-age PRESSES",
-        "how many presses old a reference will be: so much drift counts as noise",
+        "how old a reference will be, in presses; this much drift counts as noise",
         default=0,
     )
-    option(parser, "--picture OUT.png", "presses, where the others put them, and the rows", Output)
+    option(parser, "--picture OUT.png", "draw presses with their predictions, and the rows", Output)
     option(parser, "--json")
     parser.set_defaults(run=run)
 
@@ -67,8 +67,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def described_skin(presses: Presses, path: Path | None) -> Skin | None:
-    """The skin of the file ``path``, else of the presses' own description, else None. Their own
-    table of rows stands, whatever protocol the description has."""
+    """Return the skin in the file ``path``, otherwise that of the presses' own description,
+    otherwise None. The presses' own table of rows counts, whatever protocol the description has."""
     if path is not None:
         return load_skin(path)[0]
     if not presses.skin:
@@ -82,17 +82,17 @@ def described_skin(presses: Presses, path: Path | None) -> Skin | None:
 
 
 def report_lines(report: dict[str, Any]) -> list[str]:
-    """The report as a person reads it."""
+    """Return the report as lines for people."""
     error, place = report["error_mm"], report["placement"]
     curve, age = report["held_out_by_presses"], report["reference_age"]
     lines = [
         f"presses          {report['presses']}, {report['fit_s']:g} s",
         f"error            left out {error['left_out_median']:.1f} mm median,"
         f" {error['left_out_p95']:.1f} mm p95;"
-        f" as the core solves presses held out {error['held_out_median']:.1f},"
-        f" {error['held_out_p95']:.1f}" + (f", by a reference {age} presses old" if age else ""),
-        f"counted as one   {100 * report['counted_as_one']:.0f} % of presses held out,"
-        f" each touch explains {100 * report['least_share']:g} % of the data's energy",
+        f" by the core for held-out presses {error['held_out_median']:.1f},"
+        f" {error['held_out_p95']:.1f}" + (f", with a reference {age} presses old" if age else ""),
+        f"found as one     {100 * report['counted_as_one']:.0f} % of held-out presses, if each"
+        f" touch must explain {100 * report['least_share']:g} % of the data's energy",
         f"noise            {100 * report['noise']['of_a_press']:.0f} % of a press",
         "more presses     "
         + ", ".join(
@@ -102,11 +102,11 @@ def report_lines(report: dict[str, Any]) -> list[str]:
         ),
         "90 % ellipse     "
         + (
-            "too few presses to tell"
+            "unknown: too few presses"
             if report["ellipse_factor"] is None
-            else f"the fit's covariance times {report['ellipse_factor']:.2f}"
+            else f"the covariance of the fit times {report['ellipse_factor']:.3g}"
         ),
         f"skin             {place['text']}",
-        "rows without use " + (", ".join(map(str, report["silent_rows"][:20])) or "none"),
+        "useless rows     " + (", ".join(map(str, report["silent_rows"][:20])) or "none"),
     ]
     return lines + [f"note             {note}" for note in report["notes"]]

@@ -1,4 +1,5 @@
-"""``eitskin teach plan SKIN -n N``: where to press, as a list and as a template to lay on."""
+"""``eitskin teach plan SKIN -n N``: choose places to press, as a list and as a template in true
+size."""
 
 import argparse
 import json
@@ -16,20 +17,20 @@ from eitskin.view.template_picture import check_template, draw_template
 def add_parser(actions: Any) -> None:
     parser = actions.add_parser(
         "plan",
-        help="where to press, and a template in true size to lay on the skin",
+        help="choose places to press, with a template in true size to lay on the skin",
         description=(
-            "Choose places that leave the least unknown of the skin's answer, by the physics alone."
-            " The first n of a longer plan are a plan of n: stop when you like."
+            "Choose places whose presses determine the skin's response best, from physics alone."
+            " The first n places of a longer plan are a plan of n, so you can stop at any time."
         ),
     )
     option(parser, "skin SKIN.toml", "skin description", Path)
-    option(parser, "-n --presses N", "how many places", default=50)
-    option(parser, "-o --output PLAN.csv", "the places, for  teach record", Output)
-    option(parser, "--picture TEMPLATE.pdf", "in true size, on A4 pages; .svg: one sheet", Output)
+    option(parser, "-n --presses N", "number of places", default=50)
+    option(parser, "-o --output PLAN.csv", "write the places, for  teach record", Output)
+    option(parser, "--picture TEMPLATE.pdf", "true size, on A4 pages; .svg: a single page", Output)
     option(
         parser,
         "--practice SCENE.toml",
-        "a scene with a finger that presses so, to try  teach record --device sim:SCENE.toml",
+        "write a scene with these presses, to try  teach record --device sim:SCENE.toml",
         Output,
     )
     option(parser, "--json")
@@ -54,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps({"skin": skin.name, "place_mm": plan.place_mm.round(2).tolist()}))
         return 0
-    print(f"skin {skin.name!r}: press here, in this order (mm, as the description has x and y)")
+    print(f"skin {skin.name!r}: press here, in this order (mm, coordinates of the description)")
     for number, (x, y) in enumerate(plan.place_mm):
         print(f"{number + 1:4d} {x:8.1f} {y:8.1f}")
     if options.picture is not None:

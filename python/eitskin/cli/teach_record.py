@@ -1,4 +1,4 @@
-"""``eitskin teach record --plan PLAN -o PRESSES``: guides a person press by press."""
+"""``eitskin teach record --plan PLAN -o PRESSES``: guide a person through the presses of a plan."""
 
 import argparse
 import queue
@@ -38,34 +38,34 @@ TimedFrames = Iterator[tuple[np.ndarray, float]]
 def add_parser(actions: Any) -> None:
     parser = actions.add_parser(
         "record",
-        help="press where the plan says; each good press goes to the file at once",
+        help="guide through the presses of a plan; each good press is saved at once",
         description=(
             "Guide through the places of a plan: which is next, when to press, when to lift. The"
-            " untouched frame just before each press is taken with it. A press that was not held,"
-            " moved or slipped is asked for again. Stop with Ctrl-C and go on later with the same"
-            " command. On a terminal: b and Enter goes back to the press before, s leaves a place"
-            " out, q ends."
+            " untouched frame just before each press is saved with it. A press that was not held,"
+            " moved or slipped must be repeated. Stop with Ctrl-C, and continue later with the same"
+            " command. On a terminal, b and Enter goes back to the previous press, s skips a place,"
+            " and q quits."
         ),
     )
     option(
         parser,
         "--plan PLAN.csv",
-        "from  teach plan, or x_mm,y_mm by hand; or a scene that presses, as  hydrogel",
+        "from  teach plan, or with x_mm,y_mm by hand; or a scene that presses, such as  hydrogel",
         Path,
         required=True,
     )
     option(parser, "-o --output PRESSES.npz", None, Output, required=True)
-    option(parser, "--overwrite", "begin again where the output exists")
-    option(parser, "--skin SKIN.toml", "kept in the file, for  teach fit", Path)
+    option(parser, "--overwrite", "start again if the output exists")
+    option(parser, "--skin SKIN.toml", "stored in the output, for  teach fit", Path)
     option(
         parser,
         "--frames FRAMES.npz",
-        "a frames file in place of a board: the skin untouched and pressed in turn, in time",
+        "a frames file instead of a board, with the skin untouched and pressed by turns",
         Path,
     )
     each = parser.add_mutually_exclusive_group()
     for name in ("--depth-mm MM", "--force-n N"):
-        option(each, name, "of every press, where the plan says none", float, within=(0, 1e6))
+        option(each, name, "for presses without a value in the plan", float, within=(0, 1e6))
     add_device(parser, json=False)
     parser.set_defaults(run=run)
 
@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
     refuse_unwritable(options.output)
     skin = None if options.skin is None else load_skin(options.skin)[0]
     if skin is not None:
-        _say_off(plan, skin)
+        _warn_outside(plan, skin)
         text = read_bytes(options.skin, "skin description", 1_000_000).decode("utf-8")
     if options.frames is not None:
         frames = load_frames(options.frames, allow_nonfinite=True)
@@ -97,11 +97,11 @@ def _with_given(plan: PressPlan, options: argparse.Namespace) -> PressPlan:
     return plan
 
 
-def _say_off(plan: PressPlan, skin: Skin) -> None:
-    off = [k + 1 for k in range(len(plan)) if not skin.outline.contains(plan.place_mm[k : k + 1])]
-    if off:
-        names = first_few(off, 5)
-        say(f"off the skin {skin.name!r}: places {names} of {len(plan)}; are they in mm?")
+def _warn_outside(plan: PressPlan, skin: Skin) -> None:
+    inside = skin.outline.contains(plan.place_mm)
+    if not inside.all():
+        names = first_few((np.flatnonzero(~inside) + 1).tolist(), 5)
+        say(f"outside the skin {skin.name!r}: places {names} of {len(plan)}; are they in mm?")
 
 
 def _in_time(frames: Frames) -> TimedFrames:
@@ -117,7 +117,7 @@ def _before_a_board(
         if skin is not None and skin.electrodes.count != protocol.n_electrodes:
             raise ProtocolError(
                 f"{options.skin}: {skin.electrodes.count} electrodes, but the board scans"
-                f" {protocol.n_electrodes}; give it a model of this skin first:  eitskin model"
+                f" {protocol.n_electrodes}; build a model of this skin first:  eitskin model"
                 f" build {options.skin} -o MODEL.eitm,  then --model MODEL.eitm"
             )
         return _guide(options, plan, text, protocol, _live(session))
@@ -127,7 +127,8 @@ def _before_a_board(
 def raw_session(
     options: argparse.Namespace, model: Path | None, frames: int = 0
 ) -> Iterator[Session]:
-    """A board that sends frames for the guide; ``frames`` of them, 0 for all."""
+    """Open a session with a board that sends raw frames for the guide; ``frames`` of them, or all
+    if 0."""
     settings = SessionSettings(
         mode=Stream.RAW, every=1, frames=frames, model=model, firmware=options.firmware
     )
@@ -146,9 +147,9 @@ def _live(session: Session) -> TimedFrames:
 def _guide(
     options: argparse.Namespace, plan: PressPlan, text: str, protocol: Protocol, frames: TimedFrames
 ) -> int:
-    file = PressFile(options.output, plan, protocol, text, anew=options.overwrite)
+    file = PressFile(options.output, plan, protocol, text, start_again=options.overwrite)
     if file.numbers:
-        say(f"{options.output}: {len(file.numbers)} presses are there; going on")
+        say(f"{options.output}: has {len(file.numbers)} presses already; continuing")
     guide = PressGuide(plan, start=file.following)
 
     def shown(event: GuideEvent) -> None:
@@ -176,8 +177,8 @@ def _guide(
         file.close()
     if not file.numbers and not stopped:
         raise FrameError(
-            f"{options.output}: not written, as the frames ended before any press of the plan was"
-            " held"
+            f"{options.output}: not written, because the frames ended before any press of the plan"
+            " was held"
         )
     left = len(plan) - file.following
     print(f"{options.output}: {len(file.numbers)} presses" + (f", {left} places left" * (left > 0)))
@@ -185,7 +186,8 @@ def _guide(
 
 
 def _keys() -> Callable[[], str]:
-    """The letter of the last line that was typed since; nothing where nobody can type."""
+    """Return a function that gives the first letter of the last typed line, or nothing if nobody
+    can type."""
     if not sys.stdin or not sys.stdin.isatty():
         return lambda: ""
 

@@ -1,4 +1,5 @@
-"""``eitskin teach update MODEL PRESSES -o NEW``: a taught model after remounting or drying."""
+"""``eitskin teach update MODEL PRESSES -o NEW``: adapt a taught model after remounting or
+drying."""
 
 import argparse
 from pathlib import Path
@@ -18,16 +19,16 @@ from eitskin.teaching.update import update
 def add_parser(actions: Any) -> None:
     parser = actions.add_parser(
         "update",
-        help="adapt a taught model by a few new presses",
+        help="adapt a taught model with a few new presses",
         description=(
-            "Adapt a taught model after the skin was remounted, turned or has dried: 5 to 20 new"
-            " presses, in the coordinates that touches shall have. The model brings all else. It is"
-            " only moved, fully adapted, or kept as it is, whichever does best by more than chance"
-            " on presses held out; the report says which."
+            "Adapt a taught model after the skin was remounted, turned or has dried, with 5 to 20"
+            " new presses in the coordinates that touches shall have. Everything else comes from"
+            " the model. It is moved only, fully adapted, or kept, whichever is significantly the"
+            " best on held-out presses; the report states which."
         ),
     )
     option(parser, "model MODEL.eitm", "from  eitskin teach fit  or  update", Path)
-    option(parser, "presses PRESSES.npz", "new ones, from  eitskin teach record", Path)
+    option(parser, "presses PRESSES.npz", "new presses, from  eitskin teach record", Path)
     option(parser, "-o --output NEW.eitm", None, Output, required=True)
     option(parser, "--json")
     parser.set_defaults(run=run)
@@ -48,27 +49,27 @@ def run(options: argparse.Namespace) -> int:
 
 
 CHOSEN = {
-    "kept": "kept as it was: these presses make it no better beyond chance",
-    "moved": "moved: the places are others, the answers are the old ones",
-    "full": "fully adapted: places, gains and answers",
+    "kept": "kept as it was: these presses do not improve it significantly",
+    "moved": "moved: new places, old responses",
+    "full": "fully adapted: places, gains and responses",
 }
 
 
 def report_lines(report: dict[str, Any]) -> list[str]:
-    """The report as a person reads it."""
+    """Return the report as lines for people."""
     found = report["update"]
     lines = [
         f"presses          {found['presses']} new",
         f"chosen           {CHOSEN[found['chosen']]}",
         "held out         "
         + ", ".join(f"{how} {error:.1f} mm" for how, error in found["held_out_mm"].items())
-        + f" median; {report['error_mm']['held_out_p95']:.1f} p95 of what was chosen",
+        + f" median; {report['error_mm']['held_out_p95']:.1f} mm p95 of the chosen model",
     ]
     if found["chosen"] != "kept":
         x, y = found["shift_mm"]
         turned = f"turned by {found['turn_deg']:.1f} degrees" if found["turn_deg"] else "not turned"
         lines.append(
-            f"skin             places {turned} and shifted by"
-            f" ({x:.1f}, {y:.1f}) mm are the old ones"
+            f"skin             the new places, {turned} and shifted by ({x:.1f}, {y:.1f}) mm, are"
+            " the old ones"
         )
     return lines + [f"note             {note}" for note in report["notes"]]

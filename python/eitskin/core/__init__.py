@@ -1,5 +1,5 @@
-"""The C core through cffi: its two modules, the engine around them, what goes in and what comes
-out.
+"""The C core through cffi: its two compiled modules, the engine around them, and the types of its
+inputs and results.
 
-It knows no other package of eitskin but the errors.
+It uses no other package of eitskin except errors.
 """

@@ -1,5 +1,5 @@
-"""What was found wrong with a frame, by name and in a few words
-(csrc/include/eitskin/diagnostics.h, docs/reference/diagnostics.md)."""
+"""The diagnostics of a frame as names and as short texts (csrc/include/eitskin/diagnostics.h,
+docs/reference/diagnostics.md)."""
 
 from typing import Protocol
 
@@ -7,44 +7,45 @@ from eitskin.core.diagnostics_table import DIAGNOSTICS
 
 
 class DiagnosticFields(Protocol):
-    """What eits_info says of diagnostics."""
+    """The fields of eits_info that describe diagnostics."""
 
     @property
     def diagnostics(self) -> int:
-        """Bits."""
+        """Which diagnostics were made, a bit each."""
 
     @property
     def saturated(self) -> int:
-        """Rows."""
+        """The number of saturated rows."""
 
     @property
     def outliers(self) -> int:
-        """Rows left out."""
+        """The number of rows left out as outliers."""
 
     @property
     def model_mismatch(self) -> float:
-        """Share of |d|."""
+        """The fraction of |d| beyond noise that lies outside the model's range."""
 
     @property
     def open_electrodes(self) -> tuple[int, ...]:
-        """From 0."""
+        """The open electrodes, counted from 0."""
 
     @property
     def bridged_electrodes(self) -> tuple[int, ...]:
-        """Of one or more pairs."""
+        """The electrodes of all bridged pairs, counted from 0."""
 
     @property
     def noisy_electrodes(self) -> tuple[int, ...]:
-        """From 0."""
+        """The noisy electrodes, counted from 0."""
 
 
 def names(diagnostics: int) -> tuple[str, ...]:
-    """Those of ``DIAGNOSTICS`` whose bits are set."""
+    """Return the names in ``DIAGNOSTICS`` whose bits are set."""
     return tuple(name for bit, name in enumerate(DIAGNOSTICS) if diagnostics >> bit & 1)
 
 
 def words(found: DiagnosticFields) -> tuple[str, ...]:
-    """Each diagnostic in a few words: "electrode 5 open", "2 rows left out as outliers"..."""
+    """Return each diagnostic as a short text: "electrode 5 open", "2 rows left out as
+    outliers"..."""
     details = {
         "saturated": f"{plural(found.saturated, 'row')} saturated",
         "electrode open": f"{_electrodes(found.open_electrodes)} open",
@@ -65,17 +66,17 @@ def words(found: DiagnosticFields) -> tuple[str, ...]:
 
 
 def with_diagnostics(text: str, found: DiagnosticFields) -> str:
-    """``text``, why a frame is refused, and what was found wrong with it."""
+    """Return ``text``, the reason why a frame is rejected, followed by the frame's diagnostics."""
     return "; ".join((text, *words(found)))
 
 
 def plural(count: int, what: str) -> str:
-    """ "1 row", "2 rows"."""
+    """Return "1 row", "2 rows", and so on."""
     return f"{count} {what}{'s' * (count != 1)}"
 
 
 def _electrodes(numbers: tuple[int, ...]) -> str:
-    """ "electrode 5", "electrodes 5 and 6"; from 0."""
+    """Return "electrode 5" or "electrodes 5 and 6", counted from 0."""
     if not numbers:
         return "electrode"
     *most, last = map(str, numbers)

@@ -1,4 +1,5 @@
-"""The C core through cffi, in either width: what the microcontroller runs, on the host."""
+"""The C core through cffi, in either width: the same code that runs on the microcontroller, on the
+host."""
 
 import importlib
 import struct
@@ -28,7 +29,11 @@ WIDTHS = {"float32": "_core_f32", "float64": "_core_f64"}
 
 
 def load_core(width: str) -> Any:
-    """The compiled module of ``width`` ("float32" or "float64")."""
+    """Return the compiled module of ``width`` ("float32" or "float64").
+
+    Raises:
+        UsageError: the core is not built.
+    """
     try:
         return importlib.import_module(f"eitskin.core.{WIDTHS[width]}")
     except ImportError as error:
@@ -38,7 +43,7 @@ def load_core(width: str) -> Any:
 
 
 def aligned(size: int) -> npt.NDArray[np.uint8]:
-    """``size`` zeroed bytes that start at a 64-byte boundary."""
+    """Return ``size`` zeroed bytes that start at a 64-byte boundary."""
     whole = np.zeros(size + 64, dtype=np.uint8)
     start = -whole.ctypes.data % 64
     return whole[start : start + size]
@@ -46,11 +51,11 @@ def aligned(size: int) -> npt.NDArray[np.uint8]:
 
 class CoreEngine:
     """One context of the C core. ``prepared`` keeps a second copy of S in panels (faster, same
-    bits); ``portable`` forbids processor-specific kernels (slower, same bits).
+    bits); ``portable`` disables processor-specific kernels (slower, same bits).
 
     Raises:
-        ModelError: the core refuses the model.
-        UsageError: the core is not built.
+    ModelError: the core rejects the model.
+    UsageError: the core is not built.
     """
 
     def __init__(
@@ -77,8 +82,8 @@ class CoreEngine:
         self._context = context[0]
         self._lib.eits_use_portable_kernels(self._context, int(portable))
         self.n_rows, self.n_pixels = int(self._model.n_rows), int(self._model.n_pixels)
-        # buffers and their pointers are made once: casting again at each call would cost more than
-        # the call
+        # Buffers and their pointers are made once: a cast in each call would take longer than the
+        # call itself.
         self._frame = np.zeros(self.n_rows, dtype=self.dtype)
         self._frame_pointer = self._ffi.from_buffer("eits_real[]", self._frame)
         self._image = self._view(self._lib.eits_get_image(self._context), self.n_pixels)
@@ -90,17 +95,17 @@ class CoreEngine:
 
     @property
     def kernels(self) -> str:
-        """The name of the matrix products in use."""
+        """The name of the matrix kernels in use."""
         return str(self._ffi.string(self._lib.eits_kernels_name(self._context)).decode())
 
     @property
     def handles(self) -> tuple[Any, Any, Any, Any]:
-        """The C functions, cffi's side of them, the eits_model and the eits_context, for what else
-        works on this context."""
+        """The C functions, cffi's object for them, the eits_model and the eits_context, for other
+        code that works on this context."""
         return self._lib, self._ffi, self._model, self._context
 
     def _view(self, pointer: Any, count: int) -> AnyArray:
-        """An array over ``count`` reals of the context's memory, not a copy."""
+        """Return an array over ``count`` reals in the context's memory, without a copy."""
         return np.frombuffer(
             self._ffi.buffer(pointer, count * self.dtype.itemsize), dtype=self.dtype
         )
@@ -114,6 +119,11 @@ class CoreEngine:
         return f"{text} (C core, status {int(status)})"
 
     def set_options(self, options: Options) -> None:
+        """Set all options of the core.
+
+        Raises:
+            UsageError: an option has a wrong type or is out of range.
+        """
         values = asdict(options)
         try:
             values |= {name: known[values[name]] for name, known in CHOICES.items()}
@@ -126,8 +136,8 @@ class CoreEngine:
         self._saturation_v = float(options.saturation_v)
 
     def set_reference(self, frames: FloatArray) -> LearnedReference:
-        """Take the reference from quiet ``frames`` (k, m) volts: one as it is, four or more also
-        for the noise.
+        """Take the reference from untouched ``frames`` (k, m) in V. Four frames or more also give
+        the noise; fewer are averaged.
 
         Raises:
             FrameError: a frame cannot be used.
@@ -163,7 +173,7 @@ class CoreEngine:
         )
 
     def mask_rows(self, rows: BoolArray) -> None:
-        """Leave the protocol rows where ``rows`` (m,) is true out of every frame."""
+        """Leave the rows of the protocol where ``rows`` (m,) is true out of every frame."""
         self._masked = rows.copy()
         for row in range(self.n_rows):
             self._check(
@@ -171,7 +181,7 @@ class CoreEngine:
             )
 
     def forget(self) -> None:
-        """Forget the warm start and the touches that were followed."""
+        """Forget the coefficients for the warm start and the tracked touches."""
         self._lib.eits_forget(self._context)
 
     def _check_frame(self, status: int, what: str) -> None:
@@ -179,8 +189,8 @@ class CoreEngine:
             self._check(status, what, FrameError)
 
     def solve_frame(self, frame: npt.NDArray[np.floating[Any]]) -> int:
-        """Frame stage and solver alone, results left in the core; returns the status. For
-        benchmarks."""
+        """Run only the frame stage and the solver, leave the results in the core, and return the
+        status. Benchmarks use it."""
         self._frame[:] = frame
         return int(
             self._lib.eits_reconstruct(
@@ -189,18 +199,22 @@ class CoreEngine:
         )
 
     def coefficients(self) -> AnyArray:
-        """x of the last solve, (n,)."""
+        """Return x of the last solve, (n,)."""
         return self._view(self._lib.eits_get_coefficients(self._context), self.n_pixels).copy()
 
     def reduced_data(self) -> AnyArray:
-        """y of the last frame as the solver saw it, projected, (stride,)."""
+        """Return y of the last frame as the solver used it, after projection, (stride,)."""
         stride = (int(self._model.rank) + 7) // 8 * 8
         return self._view(self._lib.eits_get_reduced_data(self._context), stride).copy()
 
     def reconstruct(
         self, frame: npt.NDArray[np.floating[Any]], *, touches: bool = True
     ) -> Reconstruction:
-        """One frame (m,) volts to image and touches."""
+        """Reconstruct image and touches from one ``frame`` (m,) in V.
+
+        Raises:
+            FrameError: the frame has another length, or the core rejects it.
+        """
         if frame.shape != (self.n_rows,):
             raise FrameError(
                 f"frame: has shape {frame.shape}, but the model's protocol has {self.n_rows} rows"
@@ -224,9 +238,9 @@ class CoreEngine:
         return Reconstruction(self._image.copy(), coefficients, found, info)
 
     def follow(self, frames: npt.NDArray[np.floating[Any]]) -> None:
-        """Be as after ``frames`` (k, m) volts, the last that can be used, so that the next frame
-        costs what it costs there: the directions to ignore are built again where other rows are
-        usable than in the frame before."""
+        """Bring the frame stage to the state after ``frames`` (k, m) in V, so that the next frame
+        costs as much as it does there. Only the last usable frame counts: the directions to ignore
+        are built again if other rows are usable than in the frame before."""
         masked, macs = self._ffi.new("uint32_t *"), self._ffi.new("uint64_t *")
         for frame in frames[::-1]:
             self._frame[:] = frame
@@ -239,8 +253,9 @@ class CoreEngine:
     def reconstruct_block(
         self, frames: npt.NDArray[np.floating[Any]], *, touches: bool = True
     ) -> list[Reconstruction | FrameError]:
-        """Frames (k, m) volts, each as after :meth:`forget`, in one call of C, which runs without
-        Python's lock; a frame that cannot be used gives its error, and the others are done."""
+        """Reconstruct ``frames`` (k, m) in V, each as after :meth:`forget`, in one call of C, which
+        runs without Python's lock. For a frame that cannot be used the list holds its error; the
+        others are reconstructed."""
         check_shape(frames, self.n_rows, "frames")
         count = len(frames)
         given = np.ascontiguousarray(frames, dtype=self.dtype)
@@ -279,26 +294,27 @@ class CoreEngine:
         return self._ffi.from_buffer("eits_real[]", array)
 
     def last_info(self) -> Info:
-        """Of the last frame, however it was run."""
+        """Return the info of the last frame, whichever method ran it."""
         return _info(self._info)
 
     def self_test(self) -> float:
-        """Run the model's golden frame; the greatest difference to its image, relative to the peak.
+        """Run the model's golden frame; return the greatest difference from its image, relative to
+        the peak.
 
         Raises:
-            FrameError: the golden frame does not even run, or the image is right and a checksum of
-                the set of frames is not.
+            FrameError: the golden frame cannot be run, or its image is right but a checksum of the
+                set of frames is not.
         """
         difference = self._ffi.new("eits_real *")
         self._check_frame(self._lib.eits_self_test(self._context, difference), "golden frame")
         return float(difference[0])
 
     def self_test_sums(self) -> bytes:
-        """Section SUMS of this model: the core's revision, and a checksum of each frame of the set;
-        of a fresh float32 engine.
+        """Return section SUMS of this model: the core's revision, and a checksum of each frame of
+        the set. The engine must be new and float32.
 
         Raises:
-            FrameError: the golden reference is none.
+            FrameError: the golden reference cannot be used.
         """
         sums = self._ffi.new("uint32_t[]", self._lib.EITS_SELF_TEST_SUMS)
         self._check_frame(self._lib.eits_self_test_sums(self._context, sums), "golden frame")

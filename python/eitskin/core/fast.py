@@ -1,4 +1,4 @@
-"""The C core's fast path: touches after each drive of a scan (csrc/include/eitskin/fast.h)."""
+"""The fast path of the C core: touches after each drive of a scan (csrc/include/eitskin/fast.h)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,8 +16,8 @@ from eitskin.errors import FrameError, UsageError
 
 @dataclass(frozen=True)
 class FastTouch:
-    """A touch as of the middle of the last drive: mm, mm/s, S/m mm^2; ``id`` as long as it is
-    followed, ``confirmed`` once a whole frame has shown it."""
+    """A touch at the middle of the last drive, in mm, mm/s and S/m mm^2. ``id`` stays the same
+    while it is tracked; ``confirmed`` is set once a whole frame has shown it."""
 
     id: int
     x_mm: float
@@ -30,8 +30,9 @@ class FastTouch:
 
 @dataclass(frozen=True, eq=False)
 class AlignedFrame:
-    """A frame (m,) in V as if all its rows had been measured with its last drive; whether every
-    drive of it is accounted for; and whether what the whole-frame solver says of it may be told."""
+    """A frame (m,) in V as if all rows had been measured with its last drive. ``explained`` tells
+    whether every drive of it is explained; ``trusted`` tells whether the results of the whole-frame
+    solver for it may be reported."""
 
     volts: AnyArray
     explained: bool
@@ -39,7 +40,11 @@ class AlignedFrame:
 
 
 class FastCore:
-    """The fast path beside a core ``engine``, whose reference and options it takes."""
+    """The fast path that works beside a core ``engine`` and uses its reference and options.
+
+    Raises:
+    UsageError: the model has no fields, or a drive has too many rows.
+    """
 
     def __init__(self, engine: CoreEngine) -> None:
         self._engine, (self._lib, self._ffi, model, context) = engine, engine.handles
@@ -68,19 +73,20 @@ class FastCore:
         return np.array(self._ffi.unpack(first, self._number[0]), dtype=np.int64)
 
     def begin(self) -> None:
-        """Begin without touches, with the engine's reference.
+        """Start without touches, with the engine's reference.
 
         Raises:
-            FrameError: it has none, or one without noise: of fewer than four frames.
+            FrameError: there is no reference, or it has no noise because it was taken from fewer
+                than four frames.
         """
         self._check(self._lib.eits_fast_begin(self._state))
 
     def drive(self, number: int, volts: npt.ArrayLike, time_s: float) -> list[FastTouch]:
-        """The rows ``self.rows[number]`` (r,) in V, nan where there is none, measured about
-        ``time_s``; returns what touches the skin.
+        """Process the rows ``self.rows[number]`` (r,) in V, nan where there is no value, measured
+        at about ``time_s``; return the touches.
 
         Raises:
-            FrameError: another number of rows, no such drive, or no reference.
+            FrameError: the number of rows is wrong, there is no such drive, or no reference.
         """
         given = np.ascontiguousarray(volts, dtype=self._engine.dtype)
         pointer = self._ffi.from_buffer("eits_real[]", given)
@@ -89,9 +95,9 @@ class FastCore:
         return self.touches()
 
     def touches(self) -> list[FastTouch]:
-        """What touches the skin, as of the last drive."""
-        room = len(self._touches)
-        self._check(self._lib.eits_fast_touches(self._state, self._touches, room, self._number))
+        """Return the touches as of the last drive."""
+        capacity = len(self._touches)
+        self._check(self._lib.eits_fast_touches(self._state, self._touches, capacity, self._number))
         return [
             FastTouch(
                 int(one.id), one.x_mm, one.y_mm, one.vx_mm_per_s, one.vy_mm_per_s,
@@ -101,10 +107,11 @@ class FastCore:
         ]  # fmt: skip
 
     def aligned(self, volts: npt.ArrayLike) -> AlignedFrame:
-        """The last scan's rows (m,) in V, brought to the instant of its last drive; once a frame.
+        """Return the rows (m,) in V of the last scan, corrected to the instant of its last drive.
+        Call this once per frame.
 
         Raises:
-            FrameError: another number of rows, or no reference.
+            FrameError: the number of rows is wrong, or there is no reference.
         """
         given = np.array(volts, dtype=self._engine.dtype)
         pointer = self._ffi.from_buffer("eits_real[]", given)
@@ -119,11 +126,11 @@ class FastCore:
         )
 
     def confirm(self, found: Sequence[Touch]) -> list[FastTouch]:
-        """What the engine found in the last aligned frame; rows of electrodes that it named are
-        left out.
+        """Pass on the touches that the engine found in the last aligned frame; return the touches.
+        Rows of electrodes that the engine named faulty are left out.
 
         Raises:
-            FrameError: more touches than the core gives.
+            FrameError: there are more touches than the core can report.
         """
         names = ("x_mm", "y_mm", "strength_s_per_m_mm2")
         given = self._ffi.new(
@@ -133,10 +140,9 @@ class FastCore:
         return self.touches()
 
     def named(self, found: Info) -> Info:
-        """What may be reported of the diagnostics ``found`` in the last aligned frame: where
-        touches changed in its scan, only what the two solved frames before had. Once a solved
-        frame.
-        """
+        """Return ``found`` with the diagnostics of the last aligned frame that may be reported: if
+        touches changed during its scan, only those that the two solved frames before also had. Call
+        this once per solved frame."""
         names = "open_electrodes", "bridged_electrodes", "noisy_electrodes"
         given = {name: sum(1 << one for one in getattr(found, name)) for name in names}
         info = self._ffi.new("eits_info *", {"diagnostics": found.diagnostics, **given})

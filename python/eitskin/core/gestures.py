@@ -1,5 +1,5 @@
-"""Events from touches in time: the C core's, which a board runs too. docs/guide/gestures.md says
-what makes each."""
+"""Gesture events from touches over time, by the C core, as a board also makes them.
+docs/guide/gestures.md describes each event."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from eitskin.core.engine import load_core
 from eitskin.core.gestures_table import EventKind, EventPhase
 from eitskin.errors import UsageError
 
-# what belongs to a kind: None where it does not
+# kinds of events that have a direction, and those that have a value
 _DIRECTED = frozenset({EventKind.SWIPE})
 _VALUED = frozenset(
     {EventKind.HOLD, EventKind.SWIPE, EventKind.PINCH, EventKind.SPREAD, EventKind.ROTATE}
@@ -24,8 +24,8 @@ _SIDES = ("right", "up", "left", "down")
 
 @dataclass(frozen=True)
 class GestureEvent:
-    """One event, as eits_event; what does not belong to its kind is 0. ``zone`` counts from 1 and
-    ``zone_name`` is its name."""
+    """One event, as in eits_event; fields that do not apply to its kind are 0. ``zone`` counts from
+    1, and ``zone_name`` is the name of the zone."""
 
     kind: EventKind
     phase: EventPhase
@@ -41,28 +41,29 @@ class GestureEvent:
 
     @property
     def name(self) -> str:
-        """ "double-tap"."""
+        """The kind as a text such as "double-tap"."""
         return self.kind.name.lower().replace("_", "-")
 
     @property
     def touch_ids(self) -> tuple[int, ...]:
-        """Of one finger or two."""
+        """The ids of the one or two touches."""
         return (self.first_id, self.second_id) if self.second_id else (self.first_id,)
 
     @property
     def is_gesture(self) -> bool:
-        """More than a finger's place: worth a line to read, once."""
+        """Return whether the event is more than a change of a finger's place, and so deserves a
+        line of output."""
         return self.kind > EventKind.UP and self.phase != EventPhase.CHANGE
 
     @property
     def side(self) -> str | None:
-        """Of a swipe: right, up, left or down."""
+        """The direction of a swipe (right, up, left or down); None for other kinds."""
         if self.kind != EventKind.SWIPE:
             return None
         return _SIDES[int(((self.direction_deg + 45) % 360) // 90)]
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; None where the kind has none."""
+        """Return the event for JSON; values that do not apply to its kind are None."""
         ring = self.kind == EventKind.PRESS and self.zone_name is not None
         return {
             "kind": self.name,
@@ -76,24 +77,25 @@ class GestureEvent:
         }
 
     def text(self) -> str:
-        said = [self.name]
+        """Return the event as a line of text."""
+        words = [self.name]
         if self.phase != EventPhase.ONCE and self.kind != EventKind.PRESS:
-            said.append(
+            words.append(
                 "begins" if self.phase == EventPhase.BEGIN else self.phase.name.lower() + "s"
             )
         if self.zone_name is not None:
-            said.append(self.zone_name)
+            words.append(self.zone_name)
         if self.side is not None:
-            said.append(f"{self.side} ({self.direction_deg:.0f} deg)")
+            words.append(f"{self.side} ({self.direction_deg:.0f} deg)")
         if self.kind in _VALUED:
-            said.append(f"{self.value:.2f}{_UNITS.get(self.kind, ' times')}")
-        said.append(f"at ({self.x_mm:.1f}, {self.y_mm:.1f}) mm")
-        return " ".join(said)
+            words.append(f"{self.value:.2f}{_UNITS.get(self.kind, ' times')}")
+        words.append(f"at ({self.x_mm:.1f}, {self.y_mm:.1f}) mm")
+        return " ".join(words)
 
 
 @dataclass(frozen=True)
 class Zone:
-    """A named zone: a polygon of ``corners_mm``, or a disc (``inner_mm`` 0) or ring about
+    """A named zone: a polygon with ``corners_mm``, or a disc (``inner_mm`` is 0) or ring around
     (``x_mm``, ``y_mm``)."""
 
     name: str
@@ -105,8 +107,12 @@ class Zone:
 
 
 class Gestures:
-    """Makes events of each frame's tracked touches; ``zones`` are evaluated beside. ``options``
-    replace the usual ones of eits_gesture_options by name."""
+    """Makes events from the tracked touches of each frame, including those of ``zones``.
+    ``options`` replace defaults of eits_gesture_options by name.
+
+    Raises:
+    UsageError: an option or a zone is not valid.
+    """
 
     def __init__(self, zones: Sequence[Zone] = (), **options: float) -> None:
         module = load_core("float32")
@@ -122,12 +128,13 @@ class Gestures:
         self._room = int(self._lib.EITS_MAX_EVENTS)
         self._events = self._ffi.new("eits_event[]", self._room)
         self._touches = self._ffi.new("eits_touch[]", int(self._lib.EITS_MAX_TOUCHES))
-        self._told = self._ffi.new("uint32_t *")
+        self._count = self._ffi.new("uint32_t *")
         self._zones = _ZoneState(zones, self._lib, self._ffi) if zones else None
         self.reset()
 
     def reset(self) -> None:
-        """Begin again: no finger is down, nothing is pressed and nothing is told of it."""
+        """Start again: no finger is down, no zone is pressed, and no event reports that anything
+        ended."""
         if self._lib.eits_gestures_init(self._state, self._options):
             raise UsageError("gestures: every length and fraction must be a number, at least 0")
         if self._zones is not None:
@@ -135,11 +142,11 @@ class Gestures:
 
     @property
     def dropped(self) -> int:
-        """Events and touches that found no room."""
+        """The number of events and touches that did not fit into their buffers."""
         return int(self._state.dropped)
 
     def update(self, touches: Iterable[Touch], time_us: int) -> list[GestureEvent]:
-        """What the frame at ``time_us`` (modulo 2^32) tells, zones last."""
+        """Return the events of the frame at ``time_us`` (modulo 2^32), those of zones last."""
         count = 0
         for touch in touches:
             if count == len(self._touches):
@@ -149,14 +156,21 @@ class Gestures:
             to.strength_s_per_m_mm2, to.explained = touch.strength_s_per_m_mm2, touch.explained
             count += 1
         self._lib.eits_gestures_update(
-            self._state, self._touches, count, time_us % 2**32, self._events, self._room, self._told
+            self._state,
+            self._touches,
+            count,
+            time_us % 2**32,
+            self._events,
+            self._room,
+            self._count,
         )
-        told = int(self._told[0])
-        events = [_event(self._events[k]) for k in range(told)]
-        return events + ([] if self._zones is None else self._zones.update(self._events, told))
+        made = int(self._count[0])
+        events = [_event(self._events[k]) for k in range(made)]
+        return events + ([] if self._zones is None else self._zones.update(self._events, made))
 
     def press_zones(self, events: Sequence[GestureEvent]) -> list[GestureEvent]:
-        """What ``events``, a board's, press and release."""
+        """Return the events of zones that ``events``, which come from a board, press and
+        release."""
         if self._zones is None:
             return []
         given = [one for one in events if one.kind <= EventKind.UP]
@@ -168,14 +182,14 @@ class Gestures:
 
 
 class _ZoneState:
-    """The core's zones with what they point to."""
+    """The zones of the core, with the memory that they point to."""
 
     def __init__(self, zones: Sequence[Zone], lib: Any, ffi: Any) -> None:
         self._given, self._lib, self._ffi = tuple(zones), lib, ffi
         if len(zones) > int(lib.EITS_MAX_ZONES):
             raise UsageError(f"zones: {len(zones)} are too many; at most {lib.EITS_MAX_ZONES}")
         self._state = ffi.new("eits_zones *")
-        self._told = ffi.new("uint32_t *")
+        self._count = ffi.new("uint32_t *")
         self._room = int(lib.EITS_MAX_ZONE_EVENTS)
         self._out = ffi.new("eits_event[]", self._room)
         self._corners: list[Any] = []
@@ -192,15 +206,15 @@ class _ZoneState:
         if self._lib.eits_zones_init(self._state, self._zones, len(self._given)):
             names = ", ".join(zone.name for zone in self._given)
             raise UsageError(
-                f"zones: one of {names} cannot be: a polygon has 3 corners or more, a ring radii"
+                f"zones: one of {names} is not valid: a polygon has 3 corners or more, a ring radii"
                 " that ascend from 0, and every number is finite"
             )
 
     def update(self, events: Any, count: int) -> list[GestureEvent]:
-        self._lib.eits_zones_update(self._state, events, count, self._out, self._room, self._told)
+        self._lib.eits_zones_update(self._state, events, count, self._out, self._room, self._count)
         return [
             _event(one, self._given[one.zone - 1].name)
-            for one in (self._out[k] for k in range(self._told[0]))
+            for one in (self._out[k] for k in range(self._count[0]))
         ]
 
 
@@ -220,5 +234,5 @@ def _event(one: Any, zone_name: str | None = None) -> GestureEvent:
 
 
 def event_numbers(events: Iterable[GestureEvent]) -> FloatArray:
-    """The events' numbers (k, 10), to compare two lists bit by bit."""
+    """Return the numbers of the events (k, 10), to compare two lists bit by bit."""
     return np.array([[getattr(one, name) for name in _NAMES] for one in events]).reshape(-1, 10)

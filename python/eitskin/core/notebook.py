@@ -1,4 +1,4 @@
-"""Touches as notebooks show them."""
+"""The display of touches in notebooks."""
 
 from collections.abc import Sequence
 
@@ -6,12 +6,12 @@ from eitskin.core.diagnostics_table import Touch
 
 
 def places_text(touches: Sequence[Touch]) -> str:
-    """ "#1 (-40.0, 10.0), #2 ..." or "none"."""
+    """Return "#1 (-40.0, 10.0), #2 ..." or "none"."""
     return ", ".join(f"#{t.id} ({t.x_mm:.1f}, {t.y_mm:.1f})" for t in touches) or "none"
 
 
 def touches_html(caption: str, touches: Sequence[Touch]) -> str:
-    """A table, a row a touch."""
+    """Return an HTML table with a row per touch."""
     names = ("id", "x mm", "y mm", "radius mm", "strength S mm²/m", "force N", "confidence")
     rows = [
         (

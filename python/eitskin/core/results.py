@@ -1,4 +1,4 @@
-"""What goes into a reconstruction and what comes out, whichever engine does it."""
+"""The inputs and results of a reconstruction, for every engine."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
@@ -19,11 +19,11 @@ from eitskin.errors import FrameError, UsageError
 
 @dataclass(frozen=True)
 class Options(OptionFields):
-    """The solver's options; tables/options.toml explains each."""
+    """The options of the core; tables/options.toml explains each."""
 
     @property
     def tracks(self) -> bool:
-        """Whether touches depend on the frames before, beyond their ids."""
+        """Return whether touches depend on earlier frames, apart from their ids."""
         return self.track_confirm > 1 or self.track_hold > 0 or self.track_smooth > 0
 
 
@@ -31,7 +31,7 @@ _OPTION_KINDS = get_type_hints(Options)
 
 
 def check_options(o: Options) -> None:
-    """Refuse what eits_set_options in the C core refuses, naming the option."""
+    """Reject the values that eits_set_options in the C core rejects, and name the option."""
     for name, kind in _OPTION_KINDS.items():
         value = getattr(o, name)
         if name in RANGES:
@@ -57,7 +57,8 @@ def _check_number(name: str, value: Any, low: float, high: float, *, whole: bool
 
 
 def check_shape(frames: AnyArray, n_rows: int, what: str, least: int = 0) -> None:
-    """Refuse ``frames``, ``what`` in the error, that are not (k, n_rows), k at ``least``."""
+    """Raise a FrameError unless ``frames``, called ``what`` in the error, are (k, n_rows) with k at
+    ``least``."""
     if frames.ndim != 2 or frames.shape[1] != n_rows or len(frames) < least:
         raise FrameError(
             f"{what}: of shape {frames.shape}, but the model's protocol has {n_rows} rows"
@@ -65,8 +66,8 @@ def check_shape(frames: AnyArray, n_rows: int, what: str, least: int = 0) -> Non
 
 
 def check_reference_frames(frames: FloatArray, masked: BoolArray, saturation_v: float) -> None:
-    """Refuse quiet ``frames`` (k, m) with an unusable voltage in a row that is not ``masked`` (m,);
-    0: no saturation."""
+    """Raise a FrameError if untouched ``frames`` (k, m) have an unusable voltage in a row that is
+    not ``masked`` (m,). With ``saturation_v`` 0 no voltage counts as saturated."""
     values = np.where(masked, 0.0, frames)
     unusable = ~np.isfinite(values) | ((saturation_v > 0) & (np.abs(values) >= saturation_v))
     if unusable.any():
@@ -79,10 +80,9 @@ def check_reference_frames(frames: FloatArray, masked: BoolArray, saturation_v: 
 
 @dataclass(frozen=True)
 class LearnedReference:
-    """The reference as learned: ``correlation`` with the model's own, ``gain`` in model volts per
-    measured volt, ``noise_v`` (rms over rows) and ``lambda_noise``, both 0 if only one frame was
-    given; ``outliers`` readings were left out.
-    """
+    """The reference as learned. ``correlation`` is with the model's own reference, ``gain`` is in
+    model volts per measured volt, ``noise_v`` (rms over rows) and ``lambda_noise`` are 0 if only
+    one frame was given, and ``outliers`` is the number of readings that were left out."""
 
     frames: int
     correlation: float
@@ -93,36 +93,37 @@ class LearnedReference:
     outliers: int = 0
 
 
-NEWTONS_PER_GRAM = 9.80665e-3  # grams-force, by the standard acceleration of free fall
+NEWTONS_PER_GRAM = 9.80665e-3  # one gram-force at the standard acceleration of gravity
 
 
 def force_text(force_n: float) -> str:
-    """A load in words: grams (of force), as weights are marked."""
+    """Return a force as text in grams-force, the unit that weights are marked with."""
     return f"{force_n / NEWTONS_PER_GRAM:.1f} g"
 
 
 @dataclass(frozen=True)
 class Info(InfoFields):
-    """What a frame cost and how its solve ended. ``solve_us`` and ``touch_us`` are this host's, by
-    its clock, the frame stage with the solve; two runs that differ in nothing else are equal.
-    """
+    """The cost of a frame, the end of its solve, and its diagnostics. ``solve_us`` (frame stage and
+    solver) and ``touch_us`` are measured by the host's clock; they are ignored when two results are
+    compared."""
 
     solve_us: float = field(default=0.0, compare=False)
     touch_us: float = field(default=0.0, compare=False)
 
     @property
     def found(self) -> tuple[str, ...]:
-        """What was found wrong with the frame, each in a few words: "electrode 5 open", "2 rows
-        left out as outliers"..."""
+        """Each diagnostic of the frame as a short text: "electrode 5 open", "2 rows left out as
+        outliers"..."""
         return words(self)
 
     @property
     def diagnostics_by_name(self) -> tuple[str, ...]:
-        """Those of ``DIAGNOSTICS`` that were made."""
+        """The names of the diagnostics that were made."""
         return names(self.diagnostics)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: the same names, without the underscore of ``lambda_``; diagnostics by name."""
+        """Return the values for JSON under the same names, without the underscore of ``lambda_``,
+        and with the names of the diagnostics."""
         values = {key.rstrip("_"): value for key, value in asdict(self).items()}
         return values | {"diagnostics": list(self.diagnostics_by_name), "found": list(self.found)}
 
@@ -131,7 +132,8 @@ _MAY_BE_UNKNOWN = [kind == float | None for kind in get_type_hints(Touch).values
 
 
 def known_touch(values: Sequence[Any]) -> Touch:
-    """A touch from eits_touch's fields in order; what is 0 because it is not known is None."""
+    """Return a touch from the fields of eits_touch in order. Fields that are 0 because they are
+    unknown become None."""
     whole = list(values)
     first = _MAY_BE_UNKNOWN.index(True)
     if not whole[first]:
@@ -144,16 +146,18 @@ def known_touch(values: Sequence[Any]) -> Touch:
 
 
 def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: float) -> str:
-    """How a solve ended and what it and the touches cost, in a line; a time of 0 is not known."""
-    text = f"{iterations} iterations ({stop})" + (f", gap {gap_rel:.1e}" if iterations else "")
+    """Return a line that states how a solve ended and what it and the touches cost; a time of 0 is
+    unknown and left out."""
+    reason = "limit" if stop == "iterations" else stop
+    text = f"{iterations} iterations ({reason})" + (f", gap {gap_rel:.1e}" if iterations else "")
     text += f", {macs / 1e6:.2f} MMAC" if macs else ""
     return text + (f", {time_us / 1000:.2f} ms" if time_us else "")
 
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """One frame's result: ``image`` (n,) S/m on the model's pixels, ``coefficients`` (n,), touches
-    strongest first, info, and where it is known the ``model``."""
+    """The result of one frame: ``image`` (n,) in S/m on the model's pixels, ``coefficients`` (n,),
+    touches with the strongest first, the info, and, if known, the ``model``."""
 
     image: npt.NDArray[np.floating[Any]]
     coefficients: npt.NDArray[np.floating[Any]]
@@ -168,9 +172,9 @@ class Reconstruction:
         return touches_html("touches", self.touches)
 
     def _repr_png_(self) -> bytes | None:
-        """Where the model is known and matplotlib is installed."""
+        """Return a picture if the model is known and matplotlib is installed."""
         if self.model is None or find_spec("matplotlib") is None:
             return None
-        view = import_module("eitskin.view.touch_axes")  # rooms below do not import view
+        view = import_module("eitskin.view.touch_axes")  # core must not depend on view
         png: bytes = view.touches_png(self.model, self.touches, self.image)
         return png

@@ -1,5 +1,5 @@
-"""Three simulated touches, found by each engine: the whole path from a skin to touches in one small
-session."""
+"""Simulate three touches and find them with each engine: all steps from a skin to touches in one
+short session."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,8 +32,8 @@ ENGINE_NAMES = {"c": "C float32", "c64": "C float64", "numpy": "numpy"}
 
 @dataclass(frozen=True, eq=False)
 class Demo:
-    """The session, each engine's result, the float32 core's score, and its times in
-    microseconds."""
+    """The frames of the session, the result of each engine, and the score and times (in
+    microseconds) of the float32 core."""
 
     frames: Frames
     model: Model
@@ -45,13 +45,13 @@ class Demo:
 
     @property
     def result(self) -> Reconstruction:
-        """Of the float32 core, as on a board."""
+        """The result of the float32 core, which also runs on boards."""
         return self.results["c"]
 
     @property
     def differences(self) -> dict[str, float]:
-        """Of the C core's images to the numpy reference's, without one (it comes with the sources)
-        of float32 to float64; the greatest, over the peak."""
+        """The greatest differences of images, relative to the peak: of the C core to the numpy
+        reference, or of float32 to float64 without the reference, which comes with the sources."""
         against = "numpy" if "numpy" in self.results else "c64"
         image = self.results[against].image
         peak = np.abs(image).max() or 1.0
@@ -63,8 +63,9 @@ class Demo:
 
 
 def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
-    """Simulate on another, finer mesh with noise and contacts drawn under ``seed``, and reconstruct
-    with the prebuilt model; ``step`` gets a line for each step as it starts."""
+    """Simulate frames on another, finer mesh, with noise and contacts drawn with ``seed``, and
+    reconstruct them with the prebuilt model. ``step`` is called with a line of text at the start of
+    each step."""
     step("simulating three touches: mesh, electrodes, forward model, noise")
     touches = TouchSet("demo", seed, (TouchScene("demo", TOUCHES),))
     measurement = Measurement(snr_db=snr_db)
@@ -80,7 +81,7 @@ def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
         reconstructor.tare(frames.reference_voltage_v)
         results[engine] = reconstructor.reconstruct(frames.voltage_v[0])
     score = scorer_for(model).score(frames, 0, results["c"], "increase")
-    assert score is not None  # the frames carry their truth
+    assert score is not None  # the frames hold their truth
     core = CoreEngine(blob)
     core.set_reference(frames.reference_voltage_v)
     p50, p99 = _times_us(core, frames)
@@ -88,7 +89,8 @@ def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
 
 
 def _times_us(core: CoreEngine, frames: Frames) -> tuple[float, float]:
-    """Median and 99th percentile of a frame from volts to touches, through cffi."""
+    """Return the median and the 99th percentile of the time from voltages to touches, through
+    cffi."""
     times = []
     for _ in range(TIMED_RUNS):
         start = perf_counter()
@@ -99,7 +101,7 @@ def _times_us(core: CoreEngine, frames: Frames) -> tuple[float, float]:
 
 
 def to_json(demo: Demo) -> dict[str, Any]:
-    """Everything that the text says, in full."""
+    """Return everything that the text says, unrounded, as JSON values."""
     info, score = demo.result.info, demo.score
     return {
         "true": [[t.x_mm, t.y_mm, t.radius_mm] for t in TOUCHES],
@@ -123,7 +125,7 @@ def to_json(demo: Demo) -> dict[str, Any]:
 
 
 def to_text(demo: Demo) -> str:
-    """A table of the touches beside the truth, then what it cost."""
+    """Return a table of the found and true touches, and the cost, as text."""
     facts, info, matching = to_json(demo), demo.result.info, demo.score.matching
     lines = [
         (
@@ -152,7 +154,7 @@ def to_text(demo: Demo) -> str:
         ),
         (
             f"{info.iterations} iterations, {info.macs / 1e6:.2f} + {info.touch_macs / 1e6:.2f}"
-            f" million MACs (solve + touches); {demo.time_us_p50:.0f} us a frame, p99"
+            f" million MACs (solve + touches); {demo.time_us_p50:.0f} us per frame, p99"
             f" {demo.time_us_p99:.0f} us ({demo.kernels} kernels)"
         ),
     ]

@@ -1,5 +1,5 @@
-"""The demo's touches on the emulated board: the firmware's own results beside this host's, bit for
-bit."""
+"""Run the demo's touches on the emulated board, and compare the firmware's results with this
+host's, bit for bit."""
 
 from dataclasses import asdict, dataclass
 from time import perf_counter
@@ -31,8 +31,8 @@ EVERYTHING = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 @dataclass(frozen=True, eq=False)
 class BoardDemo:
-    """What the board found in the last of its frames, what this host made of the same raw frame,
-    and whether all frames agree."""
+    """The touches that the board found in its last frame, those that this host found in the same
+    raw frame, and the comparison of all frames."""
 
     url: str
     info: BoardInfo
@@ -50,7 +50,7 @@ def run_board_demo(url: str) -> BoardDemo:
     """Tare the board behind ``url`` (sim: or emu:) and let it solve a few frames of its scene.
 
     Raises:
-        DeviceError: it gives no frame.
+        DeviceError: it solves no frame.
         MissingExtraError: the emulator is not installed.
     """
     start = perf_counter()
@@ -91,7 +91,7 @@ def run_board_demo(url: str) -> BoardDemo:
 
 
 def to_json(demo: BoardDemo) -> dict[str, Any]:
-    """Everything that the text says, in full."""
+    """Return everything that the text says, unrounded, as JSON values."""
     quantiles = demo.summary.solve_quantiles_us
     return {
         "device": demo.url,
@@ -110,9 +110,10 @@ def to_json(demo: BoardDemo) -> dict[str, Any]:
 
 
 def to_text(demo: BoardDemo) -> str:
-    """The touches beside this host's and the truth, and whether all bits agree."""
+    """Return a table of the board's, this host's and the true touches, and whether all bits
+    agree."""
     solved = demo.summary.solve_quantiles_us
-    time = "" if solved is None else f", {solved[0] / 1e3:.1f} ms a solve in the board's time"
+    time = "" if solved is None else f", {solved[0] / 1e3:.1f} ms per solve in the board's time"
     lines = [
         (
             f"the same three touches through {demo.url}: {demo.info.board}, firmware"
@@ -120,7 +121,7 @@ def to_text(demo: BoardDemo) -> str:
         ),
         "        board x      y  radius |   host x      y  radius | error mm",
     ]
-    off_mm = dict(zip(demo.matching.pairs, demo.matching.distances_mm, strict=True))
+    error_mm = dict(zip(demo.matching.pairs, demo.matching.distances_mm, strict=True))
     place = {found: true for true, found in demo.matching.pairs}
     in_order = sorted(range(len(demo.board)), key=lambda k: place.get(k, len(demo.true)))
     for n, k in enumerate(in_order):
@@ -131,7 +132,7 @@ def to_text(demo: BoardDemo) -> str:
             row += f" {other.x_mm:8.2f} {other.y_mm:6.2f} {other.radius_mm:7.2f} |"
         else:
             row += "      none               |"
-        lines.append(row + (f" {off_mm[place[k], k]:8.2f}" if k in place else "    false"))
+        lines.append(row + (f" {error_mm[place[k], k]:8.2f}" if k in place else "    false"))
     if demo.matching.misses:
         lines.append(f"{demo.matching.misses} touches not found")
     lines.append(f"{demo.check.text()} ({demo.seconds:.1f} s)")

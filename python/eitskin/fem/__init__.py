@@ -1,2 +1,2 @@
-"""The model path: grid, mesh, complete electrode model, sensitivity. Only its users need scipy and
-netgen."""
+"""Forward modelling: image grid, mesh, complete electrode model and sensitivity. scipy and netgen
+are needed only by those who use this module."""

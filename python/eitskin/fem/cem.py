@@ -1,15 +1,15 @@
 """The complete electrode model on linear triangles (Somersalo, Cheney and Isaacson, SIAM J. Appl.
 Math. 52, 1992).
 
-A sheet of thickness t carries currents in its plane only. With potential phi inside and U_l on
-electrode l, weakly
+A skin of thickness t carries currents in its plane only. With the potential phi inside and U_l on
+electrode l, the weak form is
 
     sum_e sigma_e t int grad phi . grad v  +  sum_l (t / z_l) int_{E_l} (phi - U_l)(v - V_l)
         =  sum_l I_l V_l .
 
-An electrode without contact impedance is an ideal shunt: its nodes and U_l are one unknown. The
-last electrode's U is fixed at 0, which leaves the matrix symmetric positive definite; potentials
-are then shifted to zero electrode mean.
+An electrode without contact impedance is an ideal shunt: its nodes and U_l are one unknown. The U
+of the last electrode is fixed at 0, which leaves the matrix symmetric positive definite; afterwards
+the potentials are shifted to zero mean over the electrodes.
 """
 
 from dataclasses import dataclass
@@ -34,8 +34,8 @@ except ModuleNotFoundError as error:
 
 @dataclass
 class Counters:
-    """What a forward model has done: sparsity patterns made, factorisations, right-hand sides
-    solved."""
+    """The work of a forward model so far: sparsity patterns made, factorisations, and right-hand
+    sides solved."""
 
     patterns: int = 0
     factorisations: int = 0
@@ -44,10 +44,11 @@ class Counters:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Potentials in V per A of each solved pattern (``ForwardModel.patterns``), zero mean over the
-    electrodes.
+    """Potentials in V per A of each solved pattern (``ForwardModel.patterns``), with zero mean over
+    the electrodes.
 
-    ``nodes`` is (N, P), ``electrodes`` (L, P); ``factors`` those of the matrix (``factorise``).
+    ``nodes`` is (N, P) and ``electrodes`` is (L, P); ``factors`` are the factors of the matrix
+    (``factorise``).
     """
 
     nodes: FloatArray
@@ -57,12 +58,12 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """The matrix's sparsity pattern for one choice of shunted electrodes, and the maps that fill
-    it.
+    """The sparsity pattern of the matrix for one choice of shunted electrodes, and the map that
+    fills it.
 
-    ``unknown`` (N + L,) numbers the unknown of each node and then electrode; ``size`` itself is the
-    grounded one. The stored values are ``filling`` (nnz, E + L) times the conductivities and then
-    the electrodes' admittances 1 / z.
+    ``unknown`` (N + L,) numbers the unknown of each node, then of each electrode; the number
+    ``size`` stands for the grounded electrode. The stored values of the matrix are ``filling``
+    (nnz, E + L) times the conductivities followed by the electrodes' admittances 1 / z.
     """
 
     shunted: BoolArray
@@ -73,21 +74,22 @@ class System:
     filling: csr_matrix
 
     def matrix(self, conductivity: AnyArray, impedance: AnyArray) -> csc_matrix:
-        """The symmetric matrix, (size, size) in S; positive definite where all is real."""
+        """Return the symmetric matrix, (size, size) in S. It is positive definite if all values are
+        real."""
         admittance = np.divide(1.0, impedance, out=np.zeros_like(impedance), where=~self.shunted)
         values = self.filling @ np.concatenate([conductivity, admittance])
         return csc_matrix((values, self.indices, self.indptr), shape=(self.size, self.size))
 
 
 class ForwardModel:
-    """Boundary voltages of a skin for any conductivity of the mesh's elements; the sparsity pattern
-    is made only once.
+    """Calculates the boundary voltages of a skin for any conductivity of the mesh's elements. The
+    sparsity pattern is made only once.
 
-    ``contact_impedance_ohm_m2`` is one number or (L,); None takes the skin's. ``counters`` tells
-    the work done.
+    ``contact_impedance_ohm_m2`` is one number or (L,); None takes the skin's value. ``counters``
+    counts the work done.
 
     Raises:
-        ProtocolError: the protocol has another number of electrodes than the skin.
+        ProtocolError: the protocol and the skin have different numbers of electrodes.
         UsageError: a contact impedance is negative or not finite, or there is not one for each
             electrode.
     """
@@ -120,11 +122,11 @@ class ForwardModel:
         conductivity_s_per_m: npt.ArrayLike,
         contact_impedance_ohm_m2: npt.ArrayLike | None = None,
     ) -> Solution:
-        """Solve every pattern for conductivities (E,), or one for all elements, with a single
-        factorisation.
+        """Solve every pattern with a single factorisation. The conductivities are (E,), or one
+        number for all elements.
 
-        ``contact_impedance_ohm_m2`` replaces the model's for this call; changing which are 0 makes
-        a new pattern.
+        ``contact_impedance_ohm_m2`` replaces the model's values for this call; a different set of
+        zero impedances needs a new sparsity pattern.
         """
         conductivity = self._checked_conductivity(conductivity_s_per_m)
         impedance = self._impedance
@@ -132,27 +134,27 @@ class ForwardModel:
             impedance = _checked_impedance(contact_impedance_ohm_m2, len(impedance))
         system, n_nodes = self.system_for(impedance == 0), self.mesh.n_nodes
         currents = self.patterns.right_hand_sides(len(impedance))
-        loads = np.zeros((system.size + 1, currents.shape[1]))
-        loads[system.unknown[n_nodes:]] = currents
+        right_sides = np.zeros((system.size + 1, currents.shape[1]))
+        right_sides[system.unknown[n_nodes:]] = currents
         factors = factorise(system.matrix(conductivity, impedance))
-        potentials = np.zeros_like(loads)
-        potentials[: system.size] = factors.solve(loads[: system.size])
+        potentials = np.zeros_like(right_sides)
+        potentials[: system.size] = factors.solve(right_sides[: system.size])
         self.counters.factorisations += 1
-        self.counters.solves += loads.shape[1]
+        self.counters.solves += right_sides.shape[1]
         electrodes = potentials[system.unknown[n_nodes:]]
         shift = electrodes.mean(axis=0)
         return Solution(potentials[system.unknown[:n_nodes]] - shift, electrodes - shift, factors)
 
     def system_for(self, shunted: BoolArray) -> System:
-        """The system in which the electrodes ``shunted`` (L,) are ideal; made again only when they
-        change."""
+        """Return the system in which the electrodes ``shunted`` (L,) are ideal. It is made again
+        only if they change."""
         if not np.array_equal(shunted, self._system.shunted):
             self._system = self._make_system(shunted)
         return self._system
 
     def voltages_of(self, solution: Solution) -> FloatArray:
-        """The boundary voltages (m,) in V that the protocol reads off ``solution``, at the
-        protocol's current."""
+        """Return the boundary voltages (m,) in V that the protocol measures for ``solution``, at
+        the protocol's current."""
         return self.patterns.voltages(solution.electrodes) * self.protocol.current_a
 
     def voltages(
@@ -160,7 +162,7 @@ class ForwardModel:
         conductivity_s_per_m: npt.ArrayLike,
         contact_impedance_ohm_m2: npt.ArrayLike | None = None,
     ) -> FloatArray:
-        """The boundary voltages (m,) in V; arguments and errors as ``solve``."""
+        """Return the boundary voltages (m,) in V; arguments and errors are those of ``solve``."""
         return self.voltages_of(self.solve(conductivity_s_per_m, contact_impedance_ohm_m2))
 
     def _checked_conductivity(self, given: npt.ArrayLike) -> FloatArray:
@@ -181,7 +183,7 @@ class ForwardModel:
         return _system(self.mesh, shunted, self.element_stiffness(), self.thickness_m)
 
     def element_stiffness(self) -> FloatArray:
-        """Each element's matrix per unit of conductivity, (E, 3, 3) in m."""
+        """Return the matrix of each element per unit of conductivity, (E, 3, 3) in m."""
         x, y = self.gradients_per_m[..., 0], self.gradients_per_m[..., 1]
         products = x[:, :, None] * x[:, None, :] + y[:, :, None] * y[:, None, :]
         volumes_m3 = self.mesh.areas_mm2 * (1e-6 * self.thickness_m)
@@ -189,15 +191,15 @@ class ForwardModel:
 
 
 def factorise(matrix: csc_matrix) -> Any:
-    """The factors (scipy's SuperLU object) of a symmetric ``matrix``, real or complex, that needs
-    no pivoting."""
+    """Factorise a symmetric ``matrix``, real or complex, that needs no pivoting; return scipy's
+    SuperLU object."""
     return splu(
         matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
 
 
 def shape_gradients(mesh: Mesh) -> FloatArray:
-    """The gradients of each triangle's three hat functions, (E, 3, 2) in 1/m."""
+    """Return the gradients of the three hat functions of each triangle, (E, 3, 2) in 1/m."""
     corners = mesh.nodes_mm[mesh.triangles]
     opposite = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)
     turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
@@ -220,8 +222,8 @@ def _checked_impedance(given: npt.ArrayLike, count: int) -> FloatArray:
 
 
 def _number_unknowns(mesh: Mesh, shunted: BoolArray) -> tuple[IntArray, int]:
-    """The unknown of each node and then electrode, (N + L,), and how many there are; that number is
-    the ground's."""
+    """Number the unknowns: return the number for each node, then for each electrode, (N + L,), and
+    their count. The count itself stands for the grounded electrode."""
     count = len(shunted)
     leader = np.arange(mesh.n_nodes + count)
     for k in np.flatnonzero(shunted):
@@ -236,8 +238,8 @@ def _number_unknowns(mesh: Mesh, shunted: BoolArray) -> tuple[IntArray, int]:
 def _contact_terms(
     mesh: Mesh, shunted: BoolArray, thickness_m: float
 ) -> tuple[IntArray, IntArray, FloatArray]:
-    """Rim edges' matrices on (node, node, electrode): places (B, 3), electrodes (B,), values (B, 3,
-    3) m2 per 1/z."""
+    """Return the matrices of the rim edges on (node, node, electrode): their unknowns (B, 3), their
+    electrodes (B,), and values (B, 3, 3) in m2 per 1/z."""
     touching = np.flatnonzero(~shunted)
     owner = np.repeat(touching, [len(mesh.electrode_edges[k]) for k in touching])
     edges = np.concatenate(
@@ -276,8 +278,8 @@ def _system(mesh: Mesh, shunted: BoolArray, stiffness: FloatArray, thickness_m: 
 
 
 def _counting_order(keys: IntArray, size: int) -> IntArray:
-    """The stable order of ``keys`` in [0, size); scipy's turn from rows to columns is a counting
-    sort, so is faster."""
+    """Return the stable order of ``keys`` in [0, size). scipy converts rows to columns by a
+    counting sort, which is faster than a comparison sort."""
     one_a_row = csr_matrix(
         (np.ones(len(keys), np.int8), keys, np.arange(len(keys) + 1)), shape=(len(keys), size)
     )

@@ -1,7 +1,8 @@
-"""A mesh whose nodes are moved, so that electrodes and rim lie elsewhere: no meshing again.
+"""Deform a mesh: move its nodes so that electrodes and rim lie elsewhere, without meshing again.
 
-The rim's nodes are displaced along it and outwards; inside, each coordinate of the displacement is
-harmonic, so that it is smooth and dies away with the distance from the rim, for any outline.
+The nodes of the rim are displaced along it and outwards. Inside, each coordinate of the
+displacement is harmonic, so it is smooth and decays with the distance from the rim, for any
+outline.
 """
 
 from dataclasses import dataclass
@@ -21,16 +22,18 @@ except ModuleNotFoundError as error:
     raise missing_extra("model", "scipy") from error
 
 
-LEAST_PART = 0.5  # an electrode or a gap keeps at least this of its length
-LEAST_AREA = 0.2  # and each element this of its area
+LEAST_PART = 0.5  # the least fraction of its length that an electrode or a gap keeps
+LEAST_AREA = 0.2  # the least fraction of its area that an element keeps
 HALVINGS = 12
-SMOOTHING = 0.1  # of the rim's direction: standard deviation over the radius of the equal disk
+# standard deviation with which the rim's direction is smoothed, over the radius of the disk of
+# equal area
+SMOOTHING = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Rim:
-    """A mesh's rim: ``nodes`` (B,) counterclockwise, ``arc_mm`` (B,) where each lies from the
-    first, ``length_mm`` the whole."""
+    """The rim of a mesh: ``nodes`` (B,) counterclockwise, ``arc_mm`` (B,) their arc lengths from
+    the first node, and ``length_mm`` the length of the rim."""
 
     nodes: IntArray
     arc_mm: FloatArray
@@ -38,7 +41,7 @@ class Rim:
 
 
 def rim_of(mesh: Mesh) -> Rim:
-    """The rim of ``mesh``: the edges that only one triangle has."""
+    """Return the rim of ``mesh``: the edges that belong to only one triangle."""
     t = mesh.triangles
     edges = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
     low, high = edges.min(axis=1), edges.max(axis=1)
@@ -55,7 +58,8 @@ def rim_of(mesh: Mesh) -> Rim:
 
 
 class MeshDeformation:
-    """Moves the nodes of one mesh; what does not depend on the movement is computed once."""
+    """Moves the nodes of one mesh. Whatever does not depend on the displacement is computed
+    once."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh, self.rim = mesh, rim_of(mesh)
@@ -65,7 +69,8 @@ class MeshDeformation:
 
     @cached_property
     def _inner(self) -> tuple[IntArray, Any, csc_matrix]:
-        """The nodes inside, the factors of Laplace's matrix on them, and its part to the rim's."""
+        """The inner nodes, the factors of Laplace's matrix on them, and the part of that matrix
+        that couples them to the rim's nodes."""
         mesh = self.mesh
         gradients = shape_gradients(mesh) * np.sqrt(mesh.areas_mm2)[:, None, None]
         values = np.einsum("eik,ejk->eij", gradients, gradients)
@@ -79,8 +84,8 @@ class MeshDeformation:
 
     @cached_property
     def _tangent(self) -> FloatArray:
-        """The direction along the rim at each of its nodes, (B, 2), smoothed along it; shorter than
-        1 where the rim bends sharply, so that what moves along or across it stays smooth."""
+        """The smoothed direction of the rim at each of its nodes, (B, 2). It is shorter than 1
+        where the rim bends sharply, so that displacements along or across the rim stay smooth."""
         rim = self.rim
         places = self.mesh.nodes_mm[rim.nodes]
         steps = np.roll(places, -1, axis=0) - places
@@ -89,14 +94,14 @@ class MeshDeformation:
         apart = np.mod(rim.arc_mm[:, None] - middles + rim.length_mm / 2, rim.length_mm)
         sd = SMOOTHING * np.sqrt(self.mesh.areas_mm2.sum() / np.pi)
         weight = np.exp(-0.5 * ((apart - rim.length_mm / 2) / sd) ** 2)
-        # of the steps themselves, so that each counts by its length
+        # the mean is taken over the edges as vectors, so that each edge counts by its length
         return np.asarray(weight @ steps / (weight @ length)[:, None])
 
     def moved(self, shift_mm: FloatArray, widths: FloatArray, outwards_mm: FloatArray) -> Mesh:
-        """The mesh with each electrode moved along the rim by ``shift_mm`` (L,), its width
-        multiplied by ``widths`` (L,), and the rim's nodes outwards by ``outwards_mm`` (B,).
+        """Return the mesh with each electrode moved along the rim by ``shift_mm`` (L,), its width
+        multiplied by ``widths`` (L,), and the rim's nodes moved outwards by ``outwards_mm`` (B,).
 
-        Where electrodes would meet or an element turn over, everything moves by less.
+        If electrodes would meet or an element would turn over, all displacements are reduced.
         """
         rim, mesh = self.rim, self.mesh
         along = self._along(shift_mm, widths)
@@ -115,7 +120,8 @@ class MeshDeformation:
         return mesh
 
     def _along(self, shift_mm: FloatArray, widths: FloatArray) -> FloatArray:
-        """How far each node of the rim slides along it, (B,): linear between electrodes' ends."""
+        """Return how far each node of the rim slides along it, (B,): linear between the ends of
+        electrodes."""
         length = self.rim.length_mm
         begin, end = self._spans_mm.T
         width = np.mod(end - begin, length)

@@ -1,8 +1,8 @@
-"""The fields that the electrodes' currents make in the untouched skin.
+"""The electric fields that the electrodes' currents make in the untouched skin.
 
-The Jacobian knows products of fields, each touch by itself. What touches do to each other needs the
-fields themselves: each touch answers as a dipole in the field that the others bend
-(csrc/src/touch/interaction.h has the formula).
+The Jacobian holds only products of fields, as if each touch were alone. The interaction of touches
+needs the fields themselves: each touch responds as a dipole to the field that the other touches
+have changed (csrc/src/touch/interaction.h has the formula).
 """
 
 import numpy as np
@@ -17,11 +17,11 @@ from eitskin.fem.sensitivity import element_fields, element_to_pixel
 def electrode_fields(
     forward: ForwardModel, conductivity_s_per_m: npt.ArrayLike, grid: Grid
 ) -> FloatArray:
-    """The mean gradient of the potential over each pixel for a current into each electrode, (n, 2,
-    L) in V/m per A.
+    """Return the mean gradient of the potential over each pixel for a current into each electrode,
+    (n, 2, L) in V/m per A.
 
     Only differences between electrodes have a meaning: the field of a pair is that of its first
-    less that of its second.
+    electrode minus that of its second.
     """
     fields = element_fields(forward, forward.solve(conductivity_s_per_m))
     by_pixel = element_to_pixel(forward.mesh, grid).tocsc()

@@ -1,5 +1,5 @@
-"""The image grid: square pixels over the outline's bounding box, of which those with their centre
-inside are kept."""
+"""The image grid: square pixels over the bounding box of the outline. Pixels whose centre lies
+inside the outline are kept."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ MAX_PIXELS_ACROSS = 512
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """nx by ny square pixels, of which n are kept, ordered row by row from the lowest y, each row
-    from the lowest x.
+    """A grid of nx by ny square pixels. The n kept pixels are ordered row by row from the lowest y,
+    and within a row from the lowest x.
 
     ``origin_mm`` is the lower-left corner (x, y); ``index`` (n, 2) int64 holds each kept pixel's
     (ix, iy).
@@ -42,22 +42,24 @@ class Grid:
 
     @cached_property
     def number(self) -> IntArray:
-        """Each cell's place among the kept pixels, (ny, nx); -1 outside."""
+        """The number of each cell among the kept pixels, (ny, nx); -1 for cells that are not
+        kept."""
         place = np.full((self.ny, self.nx), -1, dtype=np.int64)
         place[self.index[:, 1], self.index[:, 0]] = np.arange(self.n_pixels)
         place.flags.writeable = False
         return place
 
     def centres_mm(self) -> FloatArray:
-        """The kept pixels' centres, (n, 2)."""
+        """Return the centres of the kept pixels, (n, 2)."""
         return np.asarray(np.asarray(self.origin_mm) + (self.index + 0.5) * self.pixel_mm)
 
     def image(self, values: npt.ArrayLike) -> FloatArray:
-        """``values`` (n,) as an image (ny, nx), row 0 the lowest y, nan outside."""
+        """Return ``values`` (n,) as an image (ny, nx). Row 0 has the lowest y; cells that are not
+        kept are nan."""
         flat = np.asarray(values, dtype=np.float64)
         if flat.shape != (self.n_pixels,):
             raise UsageError(
-                f"grid: values of shape {flat.shape} for {self.n_pixels} pixels; give one value a"
+                f"grid: values of shape {flat.shape} for {self.n_pixels} pixels; give one value per"
                 " pixel"
             )
         picture = np.full((self.ny, self.nx), np.nan)
@@ -65,7 +67,8 @@ class Grid:
         return picture
 
     def values(self, image: npt.ArrayLike) -> FloatArray:
-        """The kept pixels of an ``image`` (ny, nx), (n,): the inverse of ``image``."""
+        """Return the kept pixels of ``image`` (ny, nx), (n,): the inverse of the method
+        ``image``."""
         picture = np.asarray(image, dtype=np.float64)
         if picture.shape != (self.ny, self.nx):
             raise UsageError(
@@ -74,7 +77,8 @@ class Grid:
         return picture[self.index[:, 1], self.index[:, 0]]
 
     def locate(self, points_mm: npt.ArrayLike) -> IntArray:
-        """The kept pixel in which each of ``points_mm`` (k, 2) lies, (k,); -1 outside of all."""
+        """Return the number of the kept pixel in which each of ``points_mm`` (k, 2) lies, (k,); -1
+        if in none."""
         points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
         cell = np.floor((points - self.origin_mm) / self.pixel_mm)
         known = (cell >= 0).all(axis=1) & (cell[:, 0] < self.nx) & (cell[:, 1] < self.ny)
@@ -83,8 +87,12 @@ class Grid:
 
 
 def grid_for(outline: Outline, pixels_across: int = 32) -> Grid:
-    """The grid with ``pixels_across`` pixels along the bounding box's longer side; the shorter
-    side's cover is centred."""
+    """Return the grid with ``pixels_across`` pixels along the longer side of the bounding box,
+    centred on the shorter side.
+
+    Raises:
+        UsageError: ``pixels_across`` is out of range.
+    """
     if not 4 <= pixels_across <= MAX_PIXELS_ACROSS:
         raise UsageError(
             f"grid: {pixels_across} pixels across is out of range; use 4 to {MAX_PIXELS_ACROSS}"
@@ -100,8 +108,9 @@ def grid_for(outline: Outline, pixels_across: int = 32) -> Grid:
 
 
 def between_pixels(grid: Grid, values: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """``values`` (n_pixels, ...) of the kept pixels, linear between their centres; outside the
-    outline as at the nearest pixel. Gives (k, ...) at places (k, 2) mm."""
+    """Return a function that interpolates ``values`` (n_pixels, ...) linearly between the centres
+    of the kept pixels, and gives (k, ...) at places (k, 2) in mm. Outside the outline it uses the
+    nearest pixel."""
     from scipy.ndimage import distance_transform_edt
 
     whole = np.zeros((grid.ny, grid.nx, *values.shape[1:]))

@@ -1,4 +1,4 @@
-"""Triangle meshes of a skin, refined at its electrodes. Netgen makes them in a process of its own
+"""Triangle meshes of a skin, refined at its electrodes. Netgen makes them in a separate process
 (mesh_worker.py)."""
 
 import importlib.util
@@ -27,10 +27,10 @@ COUNT_TOLERANCE = 0.15
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Linear triangles: ``nodes_mm`` (N, 2), ``triangles`` (E, 3) counterclockwise.
+    """A mesh of linear triangles: ``nodes_mm`` (N, 2) and ``triangles`` (E, 3), counterclockwise.
 
-    ``electrode_edges`` holds for each electrode the rim edges under it as (k, 2) nodes, in order
-    counterclockwise; an electrode's two ends are nodes. Arrays are read-only.
+    ``electrode_edges`` holds for each electrode the rim edges under it as (k, 2) nodes, in
+    counterclockwise order; both ends of an electrode are nodes. Arrays are read-only.
     """
 
     nodes_mm: FloatArray
@@ -49,7 +49,7 @@ class Mesh:
 
     @cached_property
     def areas_mm2(self) -> FloatArray:
-        """Each triangle's area, (E,)."""
+        """The area of each triangle, (E,)."""
         u, v = (
             self.nodes_mm[self.triangles[:, k]] - self.nodes_mm[self.triangles[:, 0]]
             for k in (1, 2)
@@ -57,7 +57,7 @@ class Mesh:
         return np.asarray((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2)
 
     def centroids_mm(self) -> FloatArray:
-        """Each triangle's centre of area, (E, 2)."""
+        """Return the centre of area of each triangle, (E, 2)."""
         return np.asarray(self.nodes_mm[self.triangles].mean(axis=1))
 
 
@@ -68,10 +68,10 @@ def build_mesh(
     electrode_size_mm: float | None = None,
     timeout_s: float = 60.0,
 ) -> Mesh:
-    """Mesh ``skin`` with edges up to about ``max_size_mm``, ``electrode_size_mm`` on electrodes
-    (their width / 4).
+    """Mesh ``skin`` with edges of up to about ``max_size_mm``, and of ``electrode_size_mm`` on
+    electrodes (default: a quarter of their width).
 
-    A disk's rim nodes lie on the circle. The same arguments give the same mesh.
+    The rim nodes of a disk lie on the circle. The same arguments give the same mesh.
 
     Raises:
         GeometryError: the mesher failed or took longer than ``timeout_s`` (it is then killed).
@@ -95,8 +95,8 @@ def build_mesh(
 
 
 def mesh_for_elements(skin: Skin, elements: int = 3000) -> Mesh:
-    """A mesh of about ``elements`` triangles: within 15 %, or the nearest of four tries where the
-    electrodes need more.
+    """Return a mesh of about ``elements`` triangles: within 15 %, or the closest of four attempts
+    if the electrodes need more.
 
     Raises:
         UsageError: ``elements`` is not within 200 to 200,000.
@@ -121,8 +121,12 @@ def mesh_for_elements(skin: Skin, elements: int = 3000) -> Mesh:
 
 
 def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[AnyArray]:
-    """Run mesh_worker.py on ``request``, killing it after ``timeout_s``; returns its four arrays.
-    ``name``: the skin."""
+    """Run mesh_worker.py on ``request`` for the skin ``name``, and return its four arrays.
+
+    Raises:
+        GeometryError: the mesher failed, or took longer than ``timeout_s`` and was killed.
+        MissingExtraError: netgen is not installed.
+    """
     if importlib.util.find_spec("netgen") is None:
         raise missing_extra("model", "netgen-mesher")
     package_root = str(Path(eitskin.__file__).parents[1])
@@ -145,8 +149,8 @@ def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[Any
                 " the outline, use a larger element size or allow more time"
             ) from None
         if done.returncode != 0:
-            said = done.stderr.decode(errors="replace").strip().splitlines()
-            why = said[-1] if said else f"exit status {done.returncode}"
+            output = done.stderr.decode(errors="replace").strip().splitlines()
+            why = output[-1] if output else f"exit status {done.returncode}"
             raise GeometryError(f"skin {name!r}: the mesher failed ({why}); simplify the outline")
         with reply.open("rb") as arrays:
             return [np.load(arrays) for _ in range(4)]
@@ -155,14 +159,15 @@ def run_mesher(request: dict[str, Any], timeout_s: float, name: str) -> list[Any
 def _rim_pieces(
     skin: Skin, max_size_mm: float, electrode_size_mm: float
 ) -> tuple[list[list[Any]], IntArray]:
-    """The rim cut at electrode ends and corners, as mesh_worker.py wants it; each piece's electrode
-    or -1, (k,)."""
+    """Cut the rim at the ends of electrodes and at corners. Return the pieces in the form that
+    mesh_worker.py reads, and the electrode of each piece or -1, (k,)."""
     outline, perimeter = skin.outline, skin.outline.perimeter_mm
     spans = skin.electrode_spans_mm()
     corners = outline.corner_arc_lengths_mm()
     cuts = np.mod(spans.ravel(), perimeter)
     if len(corners):
-        # An electrode's end within a thousandth of its width of a corner is put on the corner.
+        # The end of an electrode is moved to a corner that is closer than a thousandth of its
+        # width.
         away = np.mod(cuts[:, None] - corners[None, :] + perimeter / 2, perimeter) - perimeter / 2
         nearest = np.argmin(np.abs(away), axis=1)
         snapped = np.abs(away[np.arange(len(cuts)), nearest]) < 1e-3 * skin.electrodes.width_mm
@@ -186,8 +191,8 @@ def _rim_pieces(
 
 
 def _without_long_arcs(cuts: FloatArray, perimeter: float) -> FloatArray:
-    """``cuts`` of a circle, and more where two are over a quarter of it apart: the tangents of a
-    long arc's ends do not meet."""
+    """Return ``cuts`` of a circle, with more cuts between two that are over a quarter of it apart:
+    the tangents at the ends of a long arc do not meet."""
     arcs = np.append(cuts[1:], cuts[0] + perimeter) - cuts
     parts = np.ceil(arcs / (perimeter / 4)).astype(int)
     more = [
@@ -221,7 +226,7 @@ def _checked_mesh(skin: Skin, arrays: list[AnyArray], owner: IntArray) -> Mesh:
 
 
 def _chained(edges: IntArray) -> IntArray:
-    """``edges`` (k, 2) put in order, so that each begins where the one before ends."""
+    """Return ``edges`` (k, 2) in an order in which each edge begins where the one before ends."""
     follower = {int(a): int(b) for a, b in edges}
     node = next(iter(set(follower) - set(follower.values())), None)
     chain = []
@@ -232,18 +237,18 @@ def _chained(edges: IntArray) -> IntArray:
 
 
 def _electrode_size(skin: Skin, max_size_mm: float) -> float:
-    """A quarter of an electrode's width, less where the mesh is fine all over, more where it is
-    very coarse."""
+    """Return the edge length on electrodes: a quarter of an electrode's width, less if the whole
+    mesh is fine, more if it is very coarse."""
     coarse = sqrt(skin.outline.area_mm2) / 24
     return min(skin.electrodes.width_mm / 4 * max(1.0, max_size_mm / coarse), max_size_mm / 3)
 
 
 def _expected_elements(skin: Skin, max_size_mm: float) -> float:
-    """Netgen's element count: the integral of 1 / size^2, where the size grows with the distance
-    from an electrode.
+    """Estimate how many elements netgen makes: the integral of 1 / size^2, where the size grows
+    with the distance from an electrode.
 
-    It is taken over one electrode's share of the skin, as a rectangle on the rim. Slope and density
-    are fitted.
+    The integral is taken over one electrode's part of the skin, approximated by a rectangle at the
+    rim. Slope and density were fitted to netgen's counts.
     """
     growth, density, points = 0.3, 2.2, 40
     along = skin.outline.perimeter_mm / skin.electrodes.count / 2
@@ -259,7 +264,7 @@ def _expected_elements(skin: Skin, max_size_mm: float) -> float:
 
 
 def _size_for(skin: Skin, elements: float) -> float:
-    """The maximum size for which ``elements`` are expected, by bisection."""
+    """Return the maximum size for which ``elements`` are expected, by bisection."""
     low = sqrt(skin.outline.area_mm2 / elements) / 10
     high = sqrt(skin.outline.area_mm2)
     for _ in range(24):

@@ -1,9 +1,9 @@
-"""The mesher's own process: a rim as JSON on stdin, the mesh's arrays in the file named on the
-command line.
+"""The process that runs the mesher. It reads a rim as JSON from stdin and writes the arrays of the
+mesh to the file named on the command line.
 
-Netgen can loop for ever on an outline it dislikes, so it runs where it can be killed.
-``eitskin.fem.mesh`` starts this module and knows the request's and the reply's form; netgen brings
-numpy along, and nothing else is imported.
+Netgen can loop forever on an outline that it cannot mesh, so it runs in a process that can be
+killed. ``eitskin.fem.mesh`` starts this module and uses the same request and reply. Only netgen is
+imported, which itself needs numpy.
 """
 
 import json
@@ -14,13 +14,13 @@ import numpy as np
 
 
 def mesh_arrays(request: dict[str, Any]) -> list[np.ndarray[Any, Any]]:
-    """Mesh the region left of the rim's pieces; returns nodes (N, 2), triangles (E, 3), edges (B,
-    2), edge pieces (B,).
+    """Mesh the region to the left of the rim's pieces; return nodes (N, 2), triangles (E, 3), edges
+    (B, 2) and the piece of each edge (B,).
 
-    ``request`` holds ``max_size`` and ``pieces``, a list that closes on itself of [x, y, control,
-    size]: a piece runs from (x, y) to the next one's, straight where ``control`` is null, else as
-    the circular arc whose end tangents meet in ``control`` [x, y]; no edge on it is longer than
-    ``size``.
+    ``request`` holds ``max_size`` and ``pieces``, a closed list of [x, y, control, size]. A piece
+    runs from its (x, y) to that of the next piece. It is straight if ``control`` is null; otherwise
+    it is the circular arc whose end tangents meet in ``control`` [x, y]. No edge on the piece is
+    longer than ``size``.
     """
     from netgen.geom2d import SplineGeometry
 
@@ -46,7 +46,7 @@ def mesh_arrays(request: dict[str, Any]) -> list[np.ndarray[Any, Any]]:
 
 
 def main(path: str) -> None:
-    """Read the request from stdin, write the arrays to ``path`` one after another."""
+    """Read the request from stdin and write the arrays to ``path``, one after another."""
     arrays = mesh_arrays(json.load(sys.stdin))
     with open(path, "wb") as reply:  # noqa: PTH123 - pathlib would only add to the start-up
         for array in arrays:

@@ -1,4 +1,5 @@
-"""Which current patterns a protocol needs solved, and how its rows are read off them."""
+"""The current patterns that must be solved for a protocol, and how the voltages of its rows follow
+from them."""
 
 from dataclasses import dataclass
 
@@ -10,13 +11,13 @@ from eitskin.skin.protocol import Protocol
 
 @dataclass(frozen=True, eq=False)
 class Patterns:
-    """P solved patterns and the Q different pairs of a protocol's m rows, drives and measurements
-    alike.
+    """The P solved patterns of a protocol with m rows, and the Q different pairs that drive or
+    measure in it.
 
-    A pattern drives 1 A into ``solved[p, 0]`` and out of ``solved[p, 1]``. Pair q is the sum of
-    patterns weighted by ``mix[q]`` (Q, P). Row r drives ``drive_sign[r]`` times pair ``drive[r]``,
+    Pattern p drives 1 A into ``solved[p, 0]`` and out of ``solved[p, 1]``. Pair q is the sum of the
+    patterns weighted by ``mix[q]`` (Q, P). Row r drives ``drive_sign[r]`` times pair ``drive[r]``
     and measures ``measure_sign[r]`` times pair ``measure[r]``; ``voltage_pairs`` (m, 2) are its
-    electrodes V+ and V-. All is per ampere.
+    electrodes V+ and V-. All values are per ampere.
     """
 
     solved: IntArray
@@ -29,13 +30,13 @@ class Patterns:
 
     @property
     def mixes(self) -> bool:
-        """Whether a pair is more than just one solved pattern."""
+        """True if any pair is not simply one of the solved patterns."""
         return len(self.mix) != len(self.solved) or not np.array_equal(
             self.mix, np.eye(len(self.mix))
         )
 
     def right_hand_sides(self, n_electrodes: int) -> FloatArray:
-        """The currents in A into each electrode, (L, P)."""
+        """Return the currents in A into each electrode, (L, P)."""
         currents = np.zeros((n_electrodes, len(self.solved)))
         columns = np.arange(len(self.solved))
         currents[self.solved[:, 0], columns] += 1.0
@@ -43,7 +44,8 @@ class Patterns:
         return currents
 
     def voltages(self, electrodes: FloatArray) -> FloatArray:
-        """Boundary voltages (m,) in V per A from the patterns' electrode potentials (L, P)."""
+        """Return the boundary voltages (m,) in V per A for the electrode potentials (L, P) of the
+        patterns."""
         potentials = electrodes @ self.mix.T if self.mixes else electrodes
         plus, minus = self.voltage_pairs[:, 0], self.voltage_pairs[:, 1]
         return np.asarray(
@@ -52,8 +54,8 @@ class Patterns:
 
 
 def patterns_for(protocol: Protocol) -> Patterns:
-    """Each different pair is one pattern; where those outnumber the electrodes, neighbours' pairs
-    make them up."""
+    """Choose the patterns of ``protocol``: one for each different pair; or, if there are more pairs
+    than electrodes, pairs of neighbours, whose sums give all other pairs."""
     rows = protocol.drive_measure.astype(np.int64)
     m, n = len(rows), protocol.n_electrodes
     pairs = rows.reshape(-1, 2)

@@ -1,9 +1,9 @@
-"""How boundary voltages change with each pixel's conductivity: the adjoint method, straight onto
+"""The sensitivity of boundary voltages to the conductivity of each pixel, by the adjoint method on
 the pixel grid.
 
 For a drive field u and a measuring field w, both per ampere, dV / dsigma_pixel = -I t int_pixel
-grad u . grad w (Geselowitz, IEEE Trans. Biomed. Eng. 18, 1971). A field is solved once; a pixel
-takes one small product of gradients.
+grad u . grad w (Geselowitz, IEEE Trans. Biomed. Eng. 18, 1971). Each field is solved only once; a
+pixel then takes one small product of gradients.
 """
 
 from itertools import pairwise
@@ -24,12 +24,12 @@ except ModuleNotFoundError as error:
     raise missing_extra("model", "scipy") from error
 
 
-PIXELS_AT_ONCE = 64  # keeps a block's gradients and products in cache
+PIXELS_AT_ONCE = 64  # the gradients and products of a block stay in the cache
 
 
 def element_to_pixel(mesh: Mesh, grid: Grid) -> csr_matrix:
-    """The fraction of each element's area that lies in each pixel, (E, n), exact to rounding; rows
-    sum to at most 1."""
+    """Return the fraction of each element's area that lies in each pixel, (E, n), exact to
+    rounding; rows sum to at most 1."""
     elements, pixels = _candidates(mesh, grid)
     alone = np.bincount(elements)[elements] == 1
     elements, pixels, alone = (values[pixels >= 0] for values in (elements, pixels, alone))
@@ -54,11 +54,11 @@ def sensitivity(
     rows: npt.ArrayLike | None = None,
     weights: csr_matrix | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """The Jacobian (m, n) in V per (S/m) and the voltages (m,) in V at a conductivity, (E,) or one
-    number.
+    """Return the Jacobian (m, n) in V per (S/m) and the voltages (m,) in V at a conductivity, (E,)
+    or one number.
 
-    ``rows`` picks rows of the protocol, such as one of each reciprocal pair. ``weights`` is
-    ``element_to_pixel`` of the same mesh and grid, for those who call repeatedly.
+    ``rows`` selects rows of the protocol, such as one of each reciprocal pair. ``weights`` is
+    ``element_to_pixel`` of the same mesh and grid; pass it if you call this repeatedly.
     """
     if weights is None:
         weights = element_to_pixel(forward.mesh, grid)
@@ -68,7 +68,8 @@ def sensitivity(
 def element_sensitivity(
     forward: ForwardModel, conductivity_s_per_m: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """As ``sensitivity``, with the mesh's elements for pixels: (m, E) and (m,)."""
+    """Return the same as ``sensitivity`` with the elements of the mesh as pixels: (m, E) and
+    (m,)."""
     each = identity(forward.mesh.n_elements, format="csr")
     return _sensitivity(forward, conductivity_s_per_m, each, None)
 
@@ -98,7 +99,7 @@ def _sensitivity(
 
 
 def element_fields(forward: ForwardModel, solution: Solution) -> FloatArray:
-    """The gradient of each pattern's potential on each element, (E, 2, P) in V/m per A."""
+    """Return the gradient of each pattern's potential on each element, (E, 2, P) in V/m per A."""
     triangles, gradients = forward.mesh.triangles, forward.gradients_per_m
     fields = gradients[:, 0, :, None] * solution.nodes[triangles[:, 0], None, :]
     for corner in (1, 2):
@@ -107,9 +108,10 @@ def element_fields(forward: ForwardModel, solution: Solution) -> FloatArray:
 
 
 def _field_products(fields: FloatArray, by_pixel: csc_matrix, block: slice) -> FloatArray:
-    """The integral of grad u_p . grad u_q over each pixel of ``block`` for all patterns, (b, P, P).
+    """Return the integral of grad u_p . grad u_q over each pixel of ``block`` for all patterns, (b,
+    P, P).
 
-    ``by_pixel`` (E, n) holds the areas in m2 that elements and pixels share.
+    ``by_pixel`` (E, n) holds the area in m2 that each element and pixel share.
     """
     bounds = by_pixel.indptr[block.start : block.stop + 1]
     mine = slice(bounds[0], bounds[-1])
@@ -126,8 +128,7 @@ def _field_products(fields: FloatArray, by_pixel: csc_matrix, block: slice) -> F
 
 
 def _rows_of_products(patterns: Patterns, products: FloatArray, rows: IntArray) -> FloatArray:
-    """The products (b, P, P) that belong to the protocol's ``rows``, without their signs, (k,
-    b)."""
+    """Select the products (b, P, P) of the protocol's ``rows``, without their signs, (k, b)."""
     drive, measure = patterns.drive[rows], patterns.measure[rows]
     if not patterns.mixes:
         return np.asarray(
@@ -141,8 +142,8 @@ def _rows_of_products(patterns: Patterns, products: FloatArray, rows: IntArray) 
 
 
 def _candidates(mesh: Mesh, grid: Grid) -> tuple[IntArray, IntArray]:
-    """Elements and the pixels whose squares meet their bounding boxes, (k,) each, by element; -1
-    for cells not kept."""
+    """Return pairs of an element and a cell whose square meets the element's bounding box, (k,)
+    each, ordered by element; -1 stands for a cell that is not kept."""
     cell = np.floor((mesh.nodes_mm - grid.origin_mm) / grid.pixel_mm).astype(np.int64)
     a, b, c = np.clip(cell, 0, np.array([grid.nx, grid.ny]) - 1)[mesh.triangles.T]
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
@@ -155,11 +156,11 @@ def _candidates(mesh: Mesh, grid: Grid) -> tuple[IntArray, IntArray]:
 
 
 def _area_in_square(x: FloatArray, y: FloatArray, side: float) -> FloatArray:
-    """The area of each counterclockwise triangle (corners x and y, (3, k)) within the square [0,
-    side]^2, (k,).
+    """Return the area of each counterclockwise triangle (corners x and y, (3, k)) within the square
+    [0, side]^2, (k,).
 
     By Green's theorem it is the integral of clip(x, 0, side) dy around the triangle, over the parts
-    with y in [0, side]; on a straight edge the clipped x has a closed integral.
+    with y in [0, side]. On a straight edge, the integral of the clipped x has a closed form.
     """
     area = np.zeros(x.shape[1])
     for begin, end in ((0, 1), (1, 2), (2, 0)):

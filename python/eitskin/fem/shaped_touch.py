@@ -1,4 +1,4 @@
-"""Touches of several shapes on a mesh: the mean change of conductivity over each element."""
+"""Touches of several shapes on a mesh: the mean change of conductivity in each element."""
 
 from dataclasses import dataclass, replace
 from math import cos, sin, sqrt
@@ -9,7 +9,7 @@ from eitskin.arrays import FloatArray, IntArray
 from eitskin.fem.mesh import Mesh
 
 PROFILES = ("uniform", "hertz", "gaussian")
-# how far a profile reaches, in its ellipse's half axes
+# the extent of each profile, in half axes of its ellipse
 REACH = {"uniform": 1.0, "hertz": 1.0, "gaussian": 2.0}
 SUBDIVISION = 6
 MIN_FACTOR = 1e-3
@@ -17,11 +17,11 @@ MIN_FACTOR = 1e-3
 
 @dataclass(frozen=True)
 class ShapedTouch:
-    """An ellipse of the area pi ``radius_mm``^2 whose long axis, ``aspect`` times the short one,
-    points along ``angle_rad``; its mean conductivity is ``contrast`` times the skin's.
+    """A touch as an ellipse of area pi ``radius_mm``^2. Its long axis is ``aspect`` times the short
+    one and points along ``angle_rad``; its mean conductivity is ``contrast`` times the skin's.
 
-    ``profile``: alike all over; Hertz's pressure sqrt(1 - rho^2), rho in half axes; or a Gaussian
-    with the second moment of the uniform one.
+    ``profile`` is "uniform", "hertz" for Hertz's pressure sqrt(1 - rho^2) with rho in half axes, or
+    "gaussian" with the second moment of the uniform profile.
     """
 
     x_mm: float
@@ -33,11 +33,11 @@ class ShapedTouch:
     profile: str = "uniform"
 
     def disc(self) -> "ShapedTouch":
-        """The disc of equal area and mean."""
+        """Return the uniform disc of equal area and mean."""
         return replace(self, aspect=1.0, angle_rad=0.0, profile="uniform")
 
     def change_at(self, points_mm: FloatArray) -> FloatArray:
-        """The relative change of conductivity at ``points_mm`` (..., 2)."""
+        """Return the relative change of conductivity at ``points_mm`` (..., 2)."""
         x, y = points_mm[..., 0] - self.x_mm, points_mm[..., 1] - self.y_mm
         c, s = cos(self.angle_rad), sin(self.angle_rad)
         stretch = sqrt(self.aspect)
@@ -53,10 +53,11 @@ class ShapedTouch:
 
 
 class TouchCover:
-    """The elements under touches on one mesh; what does not depend on the touch is computed once.
+    """Finds the elements under touches on one mesh. Whatever does not depend on the touch is
+    computed once.
 
-    Each element near a touch is split into ``SUBDIVISION`` squared equal triangles, whose centres
-    are looked at.
+    Each element near a touch is split into ``SUBDIVISION`` squared equal triangles; the touch is
+    evaluated at their centres.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -66,16 +67,16 @@ class TouchCover:
         self._weights = centres_of_parts(SUBDIVISION)
 
     def near(self, x_mm: float, y_mm: float, reach_mm: float) -> IntArray:
-        """The elements (e,) that may lie within ``reach_mm`` of a place."""
+        """Return the elements (e,) that may lie within ``reach_mm`` of a place."""
         away = np.hypot(self._middles[:, 0] - x_mm, self._middles[:, 1] - y_mm)
         return np.flatnonzero(away <= reach_mm + self._reach)
 
     def mean_change(self, touch: ShapedTouch, elements: IntArray) -> FloatArray:
-        """The mean relative change over each of ``elements`` (e,), (e,)."""
+        """Return the mean relative change in each of ``elements`` (e,), (e,)."""
         return np.asarray(touch.change_at(self._weights @ self._corners[elements]).mean(axis=1))
 
     def factors(self, touches: tuple[ShapedTouch, ...]) -> FloatArray:
-        """What each element's conductivity is multiplied by, (E,); never below a thousandth."""
+        """Return the factor for the conductivity of each element, (E,), at least a thousandth."""
         change = np.zeros(len(self._middles))
         for touch in touches:
             reach = touch.radius_mm * sqrt(touch.aspect) * REACH[touch.profile]
@@ -85,8 +86,8 @@ class TouchCover:
 
 
 def centres_of_parts(parts: int) -> FloatArray:
-    """Barycentric weights (p^2, 3) of the centres of the p^2 triangles into which lines parallel to
-    its sides cut a triangle."""
+    """Return the barycentric weights (p^2, 3) of the centres of the p^2 equal triangles into which
+    lines parallel to its sides cut a triangle."""
     upright = [(3 * i + 1, 3 * j + 1) for i in range(parts) for j in range(parts - i)]
     turned = [(3 * i + 2, 3 * j + 2) for i in range(parts - 1) for j in range(parts - 1 - i)]
     first = np.array(upright + turned, dtype=np.float64) / (3 * parts)

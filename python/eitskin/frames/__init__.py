@@ -1,2 +1,2 @@
-"""Frames: the file that holds boundary voltages, the import of other people's files, and the
-doctor."""
+"""Frames of boundary voltages: their file, the import of files from other instruments, and the
+doctor that examines them."""

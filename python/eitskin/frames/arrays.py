@@ -1,5 +1,5 @@
-"""Named arrays of .npz, .npy and .mat files, and picking one with an error that lists what is
-there."""
+"""Read named arrays from .npz, .npy and .mat files, and pick one with an error that lists the
+arrays of the file."""
 
 import io
 from collections.abc import Collection, Mapping
@@ -14,8 +14,8 @@ from eitskin.fileio import read_bytes, read_mat
 
 MAX_ARRAYS = 10_000
 MAX_UNPACKED_BYTES = 4_000_000_000
-INNOCENT_BYTES = 100_000_000  # so much may be packed as tightly as it likes
-MAX_RATIO = 300  # unpacked to packed: masks of a truth reach 100, zeros 1000
+INNOCENT_BYTES = 100_000_000  # up to this size any compression ratio is accepted
+MAX_RATIO = 300  # unpacked over packed size; masks of a truth reach 100, zeros reach 1000
 LISTED = 40
 MAX_BYTES = 1_000_000_000
 
@@ -26,9 +26,15 @@ def read_npz(
     wanted: Collection[str] | None = None,
     most_bytes: int = MAX_UNPACKED_BYTES,
 ) -> dict[str, AnyArray]:
-    """All arrays of an .npz, without pickle; ``what`` names its kind in errors. Arrays of objects
-    are left out; those that are not ``wanted`` (None: all are) are not unpacked and come out empty.
-    At most ``most_bytes`` are unpacked."""
+    """Return the arrays of an .npz by name, without pickle; ``what`` names the kind of file in
+    errors.
+
+    Arrays of objects are left out. Only ``wanted`` arrays are unpacked (None: all); the others come
+    out empty. At most ``most_bytes`` are unpacked.
+
+    Raises:
+        FileError: the file cannot be read, is damaged, or would unpack to too much.
+    """
     try:
         with Path(path).open("rb") as stream:
             archive = np.load(stream, allow_pickle=False)
@@ -52,7 +58,7 @@ def read_npz(
         raise FileError(f"{path}: no such {what}; check the path") from None
     except OSError as error:
         raise FileError(f"{path}: cannot read this {what} ({error.strerror or error})") from None
-    except Exception:  # of a damaged file numpy and zipfile raise whatever their parsers meet
+    except Exception:  # numpy and zipfile raise many kinds of errors for a damaged file
         raise FileError(
             f"{path}: not a readable .npz {what}: damaged, cut short, or another kind of file"
         ) from None
@@ -71,8 +77,8 @@ def _refuse_inflating(archive: Any, where: str, most_bytes: int) -> None:
 
 
 def read_arrays(path: str | Path) -> dict[str, AnyArray]:
-    """All arrays of a file by name: of an .npz, of an .npy its one array as "array", of a .mat a
-    struct's fields as "struct.field"."""
+    """Return all arrays of a file by name. The array of an .npy is called "array"; the fields of a
+    struct in a .mat are called "struct.field"."""
     suffix = Path(path).suffix.lower()
     if suffix == ".npz":
         return read_npz(path, "file of arrays")
@@ -80,14 +86,18 @@ def read_arrays(path: str | Path) -> dict[str, AnyArray]:
 
 
 def pick(arrays: Mapping[str, AnyArray], key: str, option: str, where: str) -> AnyArray:
-    """The array ``key``; ``option`` is the option that named it."""
+    """Return the array ``key``, which ``option`` asked for.
+
+    Raises:
+        FrameError: there is no such array.
+    """
     if key not in arrays:
         raise FrameError(f"{where}: no array {key!r} for {option}; it holds {listing(arrays)}")
     return arrays[key]
 
 
 def listing(arrays: Mapping[str, AnyArray]) -> str:
-    """Names and shapes on one line."""
+    """Return names and shapes on one line."""
     shown = [f"{name} {array.shape}" for name, array in sorted(arrays.items())][:LISTED]
     return ", ".join(shown) + (" ..." if len(arrays) > LISTED else "") if shown else "no arrays"
 
@@ -96,7 +106,7 @@ def _read_npy(path: str | Path) -> AnyArray:
     content = read_bytes(path, "array", MAX_BYTES)
     try:
         return np.asarray(np.lib.format.read_array(io.BytesIO(content), allow_pickle=False))
-    except Exception:  # of a damaged file numpy raises whatever its parser meets
+    except Exception:  # numpy raises many kinds of errors for a damaged file
         raise FileError(
             f"{path}: not a readable .npy file of numbers: damaged, cut short, or of objects; save"
             " it with numpy.save"

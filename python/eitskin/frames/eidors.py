@@ -1,5 +1,5 @@
-"""Frames, model and images to EIDORS, and its frames and images to here, as .mat files of its own
-structs (skin.eidors says which fields, and in which units)."""
+"""Export frames, model and images to EIDORS, and import its frames and images, as .mat files with
+EIDORS' own structs (skin.eidors lists the fields and units)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -20,8 +20,10 @@ from eitskin.skin.eidors import EidorsModel, find_model, read_eidors
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 
-CALM, PRESSED = ("vh", "vh.meas"), ("vi", "vi.meas")  # names that EIDORS' tutorials use
-MIN_CONTACT = 1e-4  # of a shunt, times electrode width over sheet conductance: EIDORS divides by it
+UNTOUCHED, TOUCHED = ("vh", "vh.meas"), ("vi", "vi.meas")  # names in EIDORS' tutorials
+# The contact impedance of a shunt, in electrode width over sheet conductance; EIDORS divides by the
+# impedance, so it must not be 0.
+MIN_CONTACT = 1e-4
 
 
 def save_eidors(
@@ -34,10 +36,17 @@ def save_eidors(
     frames: Frames | None = None,
     images_s_per_m: FloatArray | None = None,
 ) -> tuple[int, int]:
-    """Write ``fmdl`` (the skin on a mesh of about ``elements``), ``img_bkgnd`` (its conductivity),
-    ``J`` (m, E) in V/S, and ``c2f`` (E, n), the part of each element in each pixel of ``grid``;
-    with frames ``vh`` (the mean quiet frame) and ``vi``, with ``images_s_per_m`` (frames, n) on the
-    grid also ``img``. Returns the numbers of nodes and elements."""
+    """Write a .mat file for EIDORS, and return the numbers of nodes and elements.
+
+    It holds ``fmdl`` (the skin on a mesh of about ``elements``), ``img_bkgnd`` (its conductivity),
+    ``J`` (m, E) in V/S, and ``c2f`` (E, n), the part of each element that lies in each pixel of
+    ``grid``. With ``frames`` it also holds ``vh`` (the mean untouched frame) and ``vi``; with
+    ``images_s_per_m`` (frames, n) on the grid it also holds ``img``.
+
+    Raises:
+        FileError: the file cannot be written.
+        GeometryError, MissingExtraError: as ``mesh_for_elements``.
+    """
     from eitskin.fem.cem import ForwardModel
     from eitskin.fem.mesh import mesh_for_elements
     from eitskin.fem.sensitivity import element_sensitivity, element_to_pixel
@@ -65,8 +74,11 @@ def save_eidors(
 def with_eidors_defaults(
     path: str | Path, options: ImportOptions, protocol: Protocol | None, n_electrodes: int | None
 ) -> tuple[ImportOptions, int | None]:
-    """``options`` for a .mat file with an EIDORS model: its table, current and gain, and the frames
-    ``vi`` with the reference ``vh``, each unless the user says otherwise; the number of electrodes.
+    """Complete ``options`` for a .mat file with an EIDORS model; return them and the number of
+    electrodes.
+
+    The table, the current and the gain come from the model, the frames from ``vi`` and the
+    reference from ``vh``, unless the user has set them.
     """
     content = read_mat(path)
     if find_model(content) is None:
@@ -78,9 +90,9 @@ def with_eidors_defaults(
         options = replace(options, table=rows, keep_table=options.keep_table or protocol is None)
     named: dict[str, Any] = {}
     if source.voltage is None:
-        named["voltage"] = _named(content, PRESSED)
+        named["voltage"] = _named(content, TOUCHED)
     if source.reference is None and source.reference_frames is None:
-        named["reference"] = _named(content, CALM)
+        named["reference"] = _named(content, UNTOUCHED)
     if source.scale is None:
         named["scale"] = 1 / model.gain
     return replace(
@@ -89,12 +101,12 @@ def with_eidors_defaults(
 
 
 def eidors_images(path: str | Path, name: str, grid: Grid) -> FloatArray:
-    """The image ``name`` (a struct with elem_data) in a .mat file as conductivities in S/m on
-    ``grid``, (images, n): an element counts in a pixel by the area that both share.
+    """Return the image ``name`` (a struct with elem_data) in a .mat file as conductivities in S/m
+    on ``grid``, (images, n). Each element is weighted by the area that it shares with a pixel.
 
     Raises:
         FileError: the file cannot be read, or holds no forward model.
-        FrameError: it holds no such image of the model's elements.
+        FrameError: it holds no such image on the model's elements.
     """
     from eitskin.fem.sensitivity import element_to_pixel
 
@@ -115,8 +127,8 @@ def eidors_images(path: str | Path, name: str, grid: Grid) -> FloatArray:
 
 
 def jacobian_on(model: EidorsModel, grid: Grid) -> FloatArray | None:
-    """The Jacobian that the file of ``model`` holds, (m, n) in V per S/m on ``grid``; None where it
-    holds none."""
+    """Return the Jacobian in the file of ``model``, (m, n) in V per S/m on ``grid``, or None if the
+    file has none."""
     from eitskin.fem.sensitivity import element_to_pixel
 
     if model.jacobian is None:
@@ -126,7 +138,7 @@ def jacobian_on(model: EidorsModel, grid: Grid) -> FloatArray | None:
 
 
 def mesh_of(model: EidorsModel) -> Mesh:
-    """The triangles of ``model`` in its skin's coordinates, without electrodes."""
+    """Return the triangles of ``model`` in the coordinates of its skin, without electrodes."""
     return Mesh(model.nodes_mm - model.outline()[1], model.triangles, ())
 
 
@@ -168,7 +180,8 @@ def _forward_model(skin: Skin, protocol: Protocol, mesh: Mesh) -> dict[str, Any]
 
 
 def _stimulation(protocol: Protocol) -> list[dict[str, Any]]:
-    """A pattern for each run of rows with one drive, so that EIDORS' order of data is the rows'."""
+    """Return a pattern for each run of rows with the same drive, so that EIDORS orders the data
+    like the rows."""
     from scipy.sparse import csc_matrix
 
     n = protocol.n_electrodes
@@ -200,7 +213,7 @@ def _image(name: str, elem_data: FloatArray, model: dict[str, Any]) -> dict[str,
 
 
 def _struct_array(values: Sequence[Mapping[str, Any]]) -> AnyArray:
-    """A 1 x n struct array as scipy writes one."""
+    """Return a 1 x n struct array in the form that scipy writes."""
     array = np.empty((1, len(values)), dtype=[(name, object) for name in values[0]])
     for k, one in enumerate(values):
         array[0, k] = tuple(one.values())

@@ -1,8 +1,8 @@
-"""Frames: boundary voltages with their reference, protocol and (where known) truth, and the one
-file that holds them.
+"""Frames: boundary voltages with their reference, protocol and, if known, truth, and the file that
+holds them.
 
 The file is an .npz; docs/reference/frames-format.md lists its fields. It is read without pickle and
-checked whole.
+checked completely.
 """
 
 import json
@@ -24,7 +24,7 @@ from eitskin.skin.protocol import Protocol, in_order, table
 
 FORMAT = "eitskin-frames"
 VERSION = 1
-FOREIGN = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".npy", ".mat")  # that import reads
+FOREIGN = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".npy", ".mat")  # import reads these
 TOUCH_FIELDS = ("touch_frame", "touch_xy_mm", "touch_radius_mm", "touch_strength", "touch_sign")
 HEAD = ("format", "version", "truth_mask_extent_mm")
 REQUIRED = (
@@ -37,30 +37,32 @@ REQUIRED = (
     "meta",
 )
 OPTIONAL = ("time_s", "row_time_s", *TOUCH_FIELDS, "truth_mask", "truth_conductivity_s_per_m")
-OTHER = ("drive_order", *PATH_FIELDS)  # optional, and no field of that name
+OTHER = ("drive_order", *PATH_FIELDS)  # optional; Frames has no fields with these names
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Measured or simulated frames, in the channel order of ``protocol``.
+    """Measured or simulated frames, in the row order of ``protocol``.
 
-    Shapes: n frames, m channels, k quiet frames, t touches, masks of h rows (row 0 at the lowest y)
-        and w columns.
-    ``voltage_v`` (n, m) and ``reference_voltage_v`` (k, m), or (m,) which becomes (1, m), in volts.
-    ``frame_name`` n names ("0", "1", ... where none are given); ``time_s`` (n,) seconds from any
-    start; ``row_time_s`` (m,) when each row was measured after that, where it is known. Truth,
-    where known, is of the end of a frame's scan (a snapshot's of its time): ``touch_frame`` (t,)
-    index of the touch's frame, ``touch_xy_mm`` (t, 2) in the skin's coordinates,
-    ``touch_radius_mm`` (t,), ``touch_strength`` (t,) relative
-    conductivity change inside the touch (NaN: unknown), ``touch_sign`` (t,) +1 more conductive, -1
-    less (from the strength where not given); ``truth_mask`` (n, h, w) +1/-1/0 over
-    ``truth_mask_extent_mm`` (xmin, ymin, xmax, ymax); ``truth_conductivity_s_per_m`` (n, h, w)
-    float32 on the same raster, NaN outside the skin; ``paths`` at any instant. ``meta`` says how
-    the frames were made (JSON values only).
+    Shapes: n frames, m rows, k untouched frames, t touches, masks with h rows (row 0 at the lowest
+    y) and w columns.
+
+    ``voltage_v`` is (n, m) and ``reference_voltage_v`` is (k, m), in V; (m,) becomes (1, m).
+    ``frame_name`` holds n names, by default "0", "1", and so on. ``time_s`` (n,) counts seconds
+    from any start; ``row_time_s`` (m,), if known, is when each row was measured after that time.
+
+    The truth, if known, is that at the end of a frame's scan (for a snapshot, at its time).
+    ``touch_frame`` (t,) is the index of each touch's frame, ``touch_xy_mm`` (t, 2) its place in the
+    skin's coordinates, ``touch_radius_mm`` (t,) its radius, ``touch_strength`` (t,) the relative
+    conductivity change inside it (NaN: unknown), and ``touch_sign`` (t,) is +1 if it is more
+    conductive, -1 if less (by default from the strength). ``truth_mask`` (n, h, w) is +1, -1 or 0
+    over ``truth_mask_extent_mm`` (xmin, ymin, xmax, ymax). ``truth_conductivity_s_per_m`` (n, h, w)
+    float32 uses the same raster, NaN outside the skin. ``paths`` give the touches at any instant.
+    ``meta`` describes how the frames were made (JSON values only).
 
     Raises:
-        FrameError: a shape disagrees, or a value is not finite (unless ``allow_nonfinite``, for
-            examination only).
+        FrameError: a shape is wrong, or a value is not finite (unless ``allow_nonfinite`` is set,
+            for examination only).
     """
 
     protocol: Protocol
@@ -198,24 +200,24 @@ class Frames:
 
     @property
     def n_frames(self) -> int:
-        """The number of frames, without the quiet ones."""
+        """The number of frames, without the untouched ones of the reference."""
         return len(self.voltage_v)
 
     @property
     def reference_v(self) -> FloatArray:
-        """The mean of the quiet frames (m,), in volts."""
+        """The mean of the untouched frames (m,), in V."""
         return np.asarray(self.reference_voltage_v.mean(axis=0))
 
     def touches_in(self, frame: int) -> IntArray:
-        """Indices (.,) into the touch fields of the touches in ``frame``; empty where no truth is
-        known."""
+        """Return the indices of the touches in ``frame``, for the touch fields; empty if no truth
+        is known."""
         if self.touch_frame is None:
             return np.zeros(0, dtype=np.int64)
         return np.flatnonzero(self.touch_frame == frame)
 
 
 def save_frames(path: str | Path, frames: Frames) -> None:
-    """Write ``frames`` to ``path`` (.npz), whole or not at all; equal frames give equal bytes.
+    """Write ``frames`` to ``path`` (.npz) completely or not at all; equal frames give equal bytes.
 
     Raises:
         FileError: the folder does not exist or cannot be written.
@@ -245,17 +247,17 @@ def save_frames(path: str | Path, frames: Frames) -> None:
 
 
 def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
-    """Read a frames file; ``allow_nonfinite`` lets NaN and Inf voltages through, for ``eitskin
-    doctor``.
+    """Read a frames file. ``allow_nonfinite`` accepts NaN and Inf voltages, for ``eitskin doctor``.
 
     Raises:
         FileError: the file cannot be read.
-        FrameError: it is no frames file, a newer one, or a field is missing, unknown or wrong.
+        FrameError: it is not a frames file, it is a newer one, or a field is missing, unknown or
+            wrong.
     """
     where = str(path)
     if Path(path).suffix.lower() in FOREIGN and Path(path).exists():
         raise FrameError(
-            f"{where}: no frames file; make one of it:  eitskin import {where} -o"
+            f"{where}: not a frames file; convert it:  eitskin import {where} -o"
             f" {Path(path).with_suffix('.npz')}  with the options that  eitskin doctor {where} "
             " finds"
         )
@@ -269,7 +271,7 @@ def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
     version = arrays.get("version")
     if version is None or version.shape != () or not np.issubdtype(version.dtype, np.integer):
         raise FrameError(
-            f"{where}: the field 'version' is missing or no whole number; make the file again"
+            f"{where}: the field 'version' is missing or not a whole number; make the file again"
         )
     if int(version) != VERSION:
         raise FrameError(
@@ -334,7 +336,7 @@ def _shaped(values: FloatArray, shape: tuple[int | None, ...], name: str) -> Flo
     ):
         wanted = ", ".join("any" if want is None else str(want) for want in shape)
         raise FrameError(
-            f"{name} has shape {values.shape}; the protocol and the frames ask for ({wanted})"
+            f"{name} has shape {values.shape}; the protocol and the frames need ({wanted})"
         )
     return values
 

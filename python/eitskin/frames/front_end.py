@@ -1,8 +1,8 @@
-"""Which current and gain suit a skin, and whether the instrument's own do.
+"""The current and gain that suit a skin, and whether the instrument's own values do.
 
-The instrument of docs/guide/hardware.md drives 0.5 mA and multiplies by 3. Its current source
-reaches about 12 V at supplies of 15 V, and its converter 1.65 V. A skin that conducts badly needs
-less current, one that conducts well more current or gain.
+The instrument of docs/guide/hardware.md drives 0.5 mA and amplifies by 3. Its current source
+reaches about 12 V with supplies of 15 V, and its converter 1.65 V. A skin that conducts badly needs
+less current; one that conducts well needs more current or gain.
 """
 
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ from eitskin.arrays import FloatArray
 from eitskin.frames.homogeneous import voltages_of
 from eitskin.skin.protocol import Protocol
 
-MULTIPLEXERS_OHM = 240.0  # two ADG1206 in the current's way, data sheet
-SOURCE_REACH_V = 12.0  # of the Howland source at supplies of 15 V
+MULTIPLEXERS_OHM = 240.0  # two ADG1206 in the path of the current, data sheet
+SOURCE_REACH_V = 12.0  # greatest output of the Howland source with supplies of 15 V
 CONVERTER_REACH_V = 1.65
-SHARE_USED = 0.75  # of the converter's range, the rest for contacts and worse skins
+SHARE_USED = 0.75  # of the converter's range; the rest is a reserve for contacts and worse skins
 RECEIVER_OHM = 9_900.0  # AD8421: gain 1 + 9.9 kohm / R_G, data sheet
 MAX_GAIN = 100.0
 MAX_CURRENT_A = 5e-3 * 2**0.5  # IEC 60601-1 at 50 kHz, 5 mA rms
-SOURCE_INPUT_V = 1.0  # the source makes 1 V over its resistor the current
+SOURCE_INPUT_V = 1.0  # the current is 1 V over the resistor of the source
 E24 = (
     1.0, 1.1, 1.2, 1.3, 1.5, 1.6, 1.8, 2.0, 2.2, 2.4, 2.7, 3.0,
     3.3, 3.6, 3.9, 4.3, 4.7, 5.1, 5.6, 6.2, 6.8, 7.5, 8.2, 9.1,
@@ -29,37 +29,37 @@ E24 = (
 
 @dataclass(frozen=True)
 class FrontEnd:
-    """``current_a`` amplitude between the driven electrodes, ``gain`` from there to the
-    converter."""
+    """The settings of the front end: ``current_a`` is the amplitude between the driven electrodes,
+    ``gain`` is the amplification from the electrodes to the converter."""
 
     current_a: float = 0.5e-3
     gain: float = 3.0
 
     @property
     def gain_ppm(self) -> int:
-        """FRONT_END_GAIN_PPM of the board: volts at the converter for a volt of a model for 1
-        mA."""
+        """The board's FRONT_END_GAIN_PPM: volts at the converter per volt of a model for 1 mA, in
+        millionths."""
         return round(self.current_a / 1e-3 * self.gain * 1e6)
 
 
 @dataclass(frozen=True)
 class Demand:
-    """What a skin asks of its instrument, per ampere: the greatest boundary voltage, and the
-    greatest between driven electrodes, multiplexers included."""
+    """The demand of a skin on its instrument, per ampere: the greatest boundary voltage, and the
+    greatest voltage between driven electrodes, multiplexers included."""
 
     row_ohm: float
     drive_ohm: float
 
     def at_converter_v(self, front_end: FrontEnd) -> float:
-        """The greatest amplitude that the converter sees."""
+        """Return the greatest amplitude at the converter."""
         return self.row_ohm * front_end.current_a * front_end.gain
 
     def at_source_v(self, front_end: FrontEnd) -> float:
-        """The greatest amplitude that the current source must reach."""
+        """Return the greatest amplitude that the current source must reach."""
         return self.drive_ohm * front_end.current_a
 
     def suits(self, front_end: FrontEnd) -> bool:
-        """Whether nothing clips, and at least a tenth of the converter is used."""
+        """Return whether nothing clips and at least a tenth of the converter's range is used."""
         seen = self.at_converter_v(front_end)
         return (
             self.at_source_v(front_end) <= SOURCE_REACH_V
@@ -68,8 +68,8 @@ class Demand:
 
 
 def demand_of(transfer_ohm: FloatArray, protocol: Protocol) -> Demand:
-    """What ``protocol`` asks of its instrument on a skin with ``transfer_ohm`` (n, n), contacts
-    included."""
+    """Return the demand of ``protocol`` on the instrument for a skin with ``transfer_ohm`` (n, n),
+    contacts included."""
     rows = protocol.drive_measure.astype(np.int64)
     drives = np.unique(rows[:, :2], axis=0)
     return Demand(
@@ -79,8 +79,8 @@ def demand_of(transfer_ohm: FloatArray, protocol: Protocol) -> Demand:
 
 
 def suitable(demand: Demand) -> FrontEnd:
-    """The usual front end where it suits, else resistors that do: the greatest current that the
-    source can reach, then the gain."""
+    """Return the default front end if it suits, otherwise one with suitable resistors: the greatest
+    current that the source can reach, then the gain."""
     usual = FrontEnd()
     if demand.suits(usual):
         return usual
@@ -96,23 +96,25 @@ def suitable(demand: Demand) -> FrontEnd:
 
 
 def resistor_from(least_ohm: float) -> float:
-    """The smallest resistance of the series E24 that is no less."""
+    """Return the smallest resistance of series E24 that is at least ``least_ohm``."""
     decade = 10.0 ** np.floor(np.log10(least_ohm))
     steps = [step * decade for step in (*E24, 10.0)]
     return float(next(ohm for ohm in steps if ohm >= least_ohm * (1 - 1e-9)))
 
 
 def advice(demand: Demand) -> list[str]:
-    """What the usual front end makes of the skin, and what to change where it does not suit."""
+    """Return lines that state how the default front end suits the skin, and what to change if it
+    does not."""
     usual, better = FrontEnd(), suitable(demand)
     lines = [
-        f"front end        {_said(demand, usual)}: " + ("suits" if better == usual else "unsuited")
+        f"front end        {_described(demand, usual)}: "
+        + ("suits" if better == usual else "unsuited")
     ]
     if better != usual:
         source_ohm = SOURCE_INPUT_V / better.current_a
         gain_ohm = RECEIVER_OHM / (better.gain - 1) if better.gain > 1 else np.inf
         resistor = f"R_G {gain_ohm:,.0f} ohm" if np.isfinite(gain_ohm) else "no R_G"
-        lines.append(f"better           {_said(demand, better)}")
+        lines.append(f"better           {_described(demand, better)}")
         lines.append(
             f"                 source resistor {source_ohm:,.0f} ohm, {resistor};"
             f" FRONT_END_GAIN_PPM {better.gain_ppm}, SOURCE_UA_RMS"
@@ -126,7 +128,7 @@ def advice(demand: Demand) -> list[str]:
     return lines
 
 
-def _said(demand: Demand, front_end: FrontEnd) -> str:
+def _described(demand: Demand, front_end: FrontEnd) -> str:
     return (
         f"{1e3 * front_end.current_a:.3g} mA, gain {front_end.gain:.3g}: source"
         f" {demand.at_source_v(front_end):.3g} of {SOURCE_REACH_V:g} V, converter"

@@ -1,4 +1,4 @@
-"""The homogeneous prediction by finite elements, for outlines without a closed form. Needs the
+"""The homogeneous prediction by finite elements, for outlines without a closed form. It needs the
 extra ``model``."""
 
 from functools import lru_cache
@@ -18,17 +18,18 @@ TOUCH_CONTRAST = 3.0
 
 @lru_cache(maxsize=4)
 def fem_prediction(skin: Skin) -> "FemPrediction":
-    """The prediction of ``skin``, made once."""
+    """Return the prediction for ``skin``; it is made only once."""
     return FemPrediction(skin)
 
 
 def transfer_by_elements(skin: Skin) -> FloatArray:
-    """Potentials (n, n) in ohm as ``FemPrediction.transfer_ohm``, contact impedances included."""
+    """Return ``FemPrediction.transfer_ohm`` (n, n) of ``skin`` in ohm, contact impedances
+    included."""
     return fem_prediction(skin).transfer_ohm()
 
 
 class FemPrediction:
-    """One mesh of ``skin``, solved homogeneous or with touches; every frame is read off a transfer
+    """One mesh of ``skin``, solved without touches or with them; all frames follow from a transfer
     matrix (n, n)."""
 
     def __init__(self, skin: Skin) -> None:
@@ -39,8 +40,8 @@ class FemPrediction:
         self._forward = ForwardModel(self._mesh, skin, protocol)
 
     def transfer_ohm(self, conductivity_s_per_m: FloatArray | None = None) -> FloatArray:
-        """Potentials (n, n) of each electrode per ampere into another and out at electrode 0, which
-        is grounded."""
+        """Return the potential (n, n) of each electrode per ampere that enters at another and
+        leaves at electrode 0, which is grounded."""
         uniform = np.full(self._mesh.n_elements, self._skin.conductivity_s_per_m)
         voltages = self._forward.voltages(
             uniform if conductivity_s_per_m is None else conductivity_s_per_m
@@ -53,8 +54,8 @@ class FemPrediction:
     def touch_transfer(
         self, xy_mm: FloatArray, radius_mm: FloatArray, sign: NDArray[np.int8]
     ) -> FloatArray:
-        """The change (n, n) of the transfer matrix by touches (t, 2), (t,), (t,): centre, radius,
-        +1 or -1."""
+        """Return the change (n, n) of the transfer matrix by touches with centres (t, 2), radii
+        (t,) and signs (t,), +1 or -1."""
         conductivity = np.full(self._mesh.n_elements, self._skin.conductivity_s_per_m)
         centroids = self._mesh.centroids_mm()
         for xy, radius, direction in zip(xy_mm, radius_mm, sign, strict=True):

@@ -1,4 +1,4 @@
-"""What ``import`` is told of a source: where its frames are, and what differs in them."""
+"""The options of ``import``: where a source holds its frames, and how they differ from ours."""
 
 from dataclasses import dataclass, field
 
@@ -8,18 +8,18 @@ from eitskin.frames.truth import TruthOptions
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """How to repair a source; the defaults change nothing.
+    """The options for repairing a source; the defaults change nothing.
 
-    ``order``: of ORDERS, or "table" with ``table_file`` (text, four columns) or ``table`` (rows
-    from 0). ``keep_table``: keep the source's own table. ``sign``: "reversed" negates, "magnitude"
-    takes each channel's sign from the homogeneous prediction. ``rotate``, ``mirror``: our number of
-    source electrode 0, and whether counting then goes down. ``clockwise``: the source counts
-    clockwise, so mirror if the skin does not. ``swaps``: pairs of our electrodes whose wires were
-    exchanged. ``flip_channels``, ``impute_channels``, ``drop_channels``: channels of the protocol's
-    order to negate, to fill from their reciprocals, and to leave out; ``drop_electrodes``: every
-    channel that uses them.
-    ``equalise``: give each channel the gain that makes the reference the homogeneous prediction.
-    ``current_a``: instead of the protocol's.
+    ``order`` is one of ORDERS, or "table" with ``table_file`` (text with four columns) or ``table``
+    (rows from 0). ``keep_table`` keeps the source's own table. ``sign`` is "signed"; "reversed",
+    which negates; or "magnitude", which takes the sign of each row from the homogeneous prediction.
+    ``rotate`` is our number of source electrode 0; with ``mirror`` the numbers then count down.
+    ``clockwise`` states that the source counts clockwise, which mirrors it unless the skin does
+    too. ``swaps`` are pairs of our electrodes whose wires were exchanged. ``flip_channels``,
+    ``impute_channels`` and ``drop_channels`` list rows, in the protocol's order, to negate, to fill
+    from their reciprocals, and to leave out; ``drop_electrodes`` leaves out every row that uses
+    them. ``equalise`` gives each row the gain that makes the reference equal the homogeneous
+    prediction. ``current_a`` replaces the protocol's current.
     """
 
     source: SourceOptions = field(default_factory=SourceOptions)

@@ -1,9 +1,9 @@
-"""Import: somebody else's file to frames in this project's order, sign and units; every step is
-recorded in ``meta``.
+"""Import a file of another instrument as frames in this project's order, sign and units. Every step
+is recorded in ``meta``.
 
-The steps, in this order: read; number the electrodes as the skin does; put the rows in the
-protocol's order; undo a swap of wires; set the sign; negate channels, fill channels from their
-reciprocals; leave channels out; equalise gains.
+The steps are, in this order: read the file, number the electrodes as the skin does, put the rows in
+the protocol's order, undo exchanged wires, set the sign, negate rows, fill rows from their
+reciprocals, leave rows out, equalise gains.
 """
 
 from dataclasses import asdict, replace
@@ -34,7 +34,7 @@ from eitskin.frames.truth import TruthOptions, truth_fields
 from eitskin.skin.protocol import Protocol, table
 from eitskin.skin.skin import Skin
 
-ASSUMED_QUIET = "no quiet frames were named; the first frame is taken for one"
+ASSUMED_QUIET = "no quiet frames were named; the first frame is used as one"
 
 
 def import_frames(
@@ -48,10 +48,15 @@ def import_frames(
 ) -> Frames:
     """Read ``path`` and repair it as ``options`` say.
 
-    ``protocol`` is the wanted order (None, or ``keep_table``: the source's own table is kept, with
-    ``n_electrodes``); ``skin`` gives numbering direction and prediction where known. An eitskin
-    frames file may be repaired again. ``lenient`` is for examination: NaN and Inf pass, and where
-    no quiet frames are named the first frame is taken.
+    ``protocol`` is the order of the result; with None or ``keep_table`` the source's own table is
+    kept, with ``n_electrodes``. ``skin``, if known, gives the direction of numbering and the
+    prediction. An eitskin frames file can be repaired again. ``lenient`` is for examination: it
+    accepts NaN and Inf, and uses the first frame if no untouched frames are named.
+
+    Raises:
+        FileError: the file cannot be read.
+        UsageError: options are missing, or contradict each other or the source.
+        FrameError, ProtocolError: the content does not fit the options.
     """
     if Path(path).suffix.lower() == ".mat":
         options, n_electrodes = with_eidors_defaults(path, options, protocol, n_electrodes)
@@ -112,7 +117,8 @@ def import_frames(
 def _read(
     path: str | Path, options: ImportOptions, protocol: Protocol | None, n_electrodes: int | None
 ) -> tuple[RawFrames, Frames | None, Protocol | None]:
-    """The raw frames; where ``path`` already is a frames file also that, and its own protocol."""
+    """Return the raw frames. If ``path`` is already a frames file, return also its frames and their
+    protocol."""
     if is_frames_file(path):
         if (
             options.source != SourceOptions()
@@ -120,7 +126,7 @@ def _read(
             or options.truth != TruthOptions()
         ):
             raise UsageError(
-                f"{path}: a frames file already; options that say where its arrays are do not go"
+                f"{path}: already a frames file; options that say where its arrays are do not go"
                 " with it"
             )
         frames = load_frames(path, allow_nonfinite=True)
@@ -140,7 +146,11 @@ def _check_protocol(path: str | Path, frames: Frames, protocol: Protocol | None)
 def accepted_counts(
     options: ImportOptions, protocol: Protocol | None
 ) -> tuple[tuple[int, ...], str]:
-    """How many rows a source frame may have, and the words that say why."""
+    """Return how many rows a frame of the source may have, and words for the reason.
+
+    Raises:
+        UsageError: the options name no protocol.
+    """
     if options.source.protocol_table is not None:
         return (), "its table"
     if options.table is not None:
@@ -174,7 +184,7 @@ def _placed(
     n_electrodes: int | None,
     where: str,
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """The result's rows (m, 4), and where each comes from: source index and sign (m,)."""
+    """Return the rows of the result (m, 4), and the index and sign (m,) of each in the source."""
     n = _count(protocol, n_electrodes)
     ours = source_rows(options, raw.table, protocol, skin, n, where)
     if protocol is None or options.keep_table:

@@ -1,5 +1,5 @@
-"""A layout: how an instrument's lines are frames, in a TOML file (docs/reference/layout.md). It
-serves files and live lines alike."""
+"""A layout describes in a TOML file how the lines of an instrument form frames
+(docs/reference/layout.md). It is used for files and for live lines."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ from eitskin.frames.tables import chosen
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, protocol_from_table, protocol_to_table
 
-# what keys hold: text, texts, flag, number, whole, wholes, or words to choose from
+# the type of each key: text, texts, flag, number, whole, wholes, or the words to choose from
 LINES: dict[str, Any] = {
     "delimiter": "text", "label": "text", "comment": "texts", "cells": "whole",
     "columns": "text", "header_rows": "whole",
@@ -38,17 +38,17 @@ CHANNELS: dict[str, Any] = {
     "current_a": "number",
 }  # fmt: skip
 MAX_CELLS, MAX_BAUD, MAX_RATE_HZ = 1_000_000, 20_000_000, 10_000.0
-MOST_BAD = 0.5  # of a line's cells; with more it is no frame
+MOST_BAD = 0.5  # a line with a larger part of bad cells is not a frame
 TOO_LARGE = 1e12
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How lines are frames.
+    """The format in which lines form frames.
 
-    ``options``: what ``import`` needs to know of them. ``protocol``: of the frames, where it is not
-    the model's. ``baud``, ``send`` (once, when the port is opened) and ``rate_hz`` (frames a
-    second) are of a live instrument.
+    ``options`` are those that ``import`` needs. ``protocol`` is that of the frames if it is not the
+    model's. ``baud``, ``send`` (a text sent once, when the port is opened) and ``rate_hz`` (frames
+    per second) describe a live instrument.
     """
 
     options: ImportOptions = field(default_factory=ImportOptions)
@@ -59,7 +59,7 @@ class Layout:
 
     @property
     def form(self) -> LineFormat:
-        """How cells stand in a line."""
+        """The format by which a line is divided into cells."""
         source = self.options.source
         return LineFormat(source.delimiter or "comma", source.label, source.comment)
 
@@ -68,7 +68,8 @@ def load_layout(path: str | Path) -> Layout:
     """Read a layout.
 
     Raises:
-        FileError, ConfigError, ProtocolError: it cannot be read, or a key is unknown or wrong.
+        FileError, ConfigError, ProtocolError: the file cannot be read, or a key is unknown or
+            wrong.
     """
     content, where = load_toml(path, "layout"), str(path)
     check_keys(content, ("lines", "channels", "protocol", "port"), where)
@@ -101,7 +102,7 @@ def load_layout(path: str | Path) -> Layout:
 
 
 def save_layout(path: str | Path, layout: Layout) -> None:
-    """Write ``layout``; what is at its default is left out."""
+    """Write ``layout`` to ``path``, without values that equal their defaults."""
     options, port = layout.options, {}
     lines = _changed(options.source, LINES)
     channels = _changed(options, CHANNELS)
@@ -131,12 +132,17 @@ def save_layout(path: str | Path, layout: Layout) -> None:
 def layout_of(
     raw: RawFrames, options: ImportOptions, protocol: Protocol | None, where: str
 ) -> Layout:
-    """The layout of a file that ``options`` read as ``raw``, with all that was found in it."""
+    """Return the layout of a file that ``options`` read as ``raw``, including everything that was
+    detected in it.
+
+    Raises:
+        UsageError: the source is not a text with frames in rows.
+    """
     read = raw.text
     if read is None:
         raise UsageError(
-            f"{where}: a layout is of text with frames in rows; this source is none, so there is"
-            " nothing to save"
+            f"{where}: a layout describes text with frames in rows; this source is not such a text,"
+            " so there is nothing to save"
         )
     source = replace(
         options.source,
@@ -159,19 +165,19 @@ def layout_of(
 
 @dataclass(frozen=True, eq=False)
 class LineFrame:
-    """A line's channels (c,), real or complex, times the layout's scale, NaN where a cell is no
-    number; its time in s where the layout names one."""
+    """The channels (c,) of a line, real or complex, times the layout's scale, NaN for cells that
+    are not numbers; and its time in s if the layout names a column for it."""
 
     values: AnyArray
     time_s: float | None
 
 
 class BadLine(EitskinError):
-    """A line that is no frame; the text says why."""
+    """Raised for a line that is not a frame; the text gives the reason."""
 
 
 class LineParser:
-    """Turns rows of cells into frames, as ``layout`` says."""
+    """Converts rows of cells to frames as ``layout`` says."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout, self.cells = layout, layout.options.source.cells
@@ -181,6 +187,11 @@ class LineParser:
             self._choose(self.cells)
 
     def frame(self, row: Row) -> LineFrame:
+        """Return the frame in ``row``.
+
+        Raises:
+            BadLine: the row is not a frame.
+        """
         cells = row.cells
         if self.cells is None:
             if not any(parse_cell(cell) is not None for cell in cells):
@@ -197,7 +208,8 @@ class LineParser:
 
     @property
     def channels(self) -> int | None:
-        """Of a frame; None while no line has come and the layout does not say."""
+        """The number of channels of a frame; None if the layout does not state it and no line has
+        come yet."""
         if self.cells is None:
             return None
         return len(self._columns) // (2 if self._paired else 1)
@@ -245,7 +257,7 @@ def _parsed(cells: Sequence[str]) -> AnyArray:
 
 
 def _spec(columns: Sequence[int]) -> str:
-    """A list of columns in as few words as a:b and a:b:step make it."""
+    """Return a list of columns in short form, such as a:b or a:b:step."""
     if len(columns) > 2 and len(set(np.diff(columns).tolist())) == 1 and columns[1] > columns[0]:
         step = columns[1] - columns[0]
         last = columns[-1] + 1

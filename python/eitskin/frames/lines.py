@@ -1,4 +1,5 @@
-"""Lines of an instrument to rows of cells: one parser, of files and of what comes over a line."""
+"""Divide the lines of an instrument into rows of cells. Files and live lines use the same
+parser."""
 
 import re
 from collections.abc import Sequence
@@ -8,7 +9,7 @@ from eitskin.errors import UsageError
 
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": None}
 COMMENT = ("#", "%")
-# bounded, so that no line takes long
+# repetitions are bounded, so that no line takes long to match
 OWN_LABEL = re.compile(r"\s{0,40}([A-Za-z_][A-Za-z_ -]{0,39}?)\s{0,40}\d{0,12}\s{0,40}[:=]")
 AFTER_LABEL = r"(?:\s{0,40}\d{0,12}\s{0,40}(?:[:=]|$))?\s*"
 DECIMALS = re.compile(r"decimals:([1-9])")
@@ -16,7 +17,7 @@ DECIMALS = re.compile(r"decimals:([1-9])")
 
 @dataclass(frozen=True)
 class Row:
-    """The cells of one frame, or of one line, and the ``line`` (from 1) that they begin on."""
+    """The cells of one frame or one line, and the ``line`` (from 1) on which they begin."""
 
     line: int
     cells: tuple[str, ...]
@@ -24,12 +25,13 @@ class Row:
 
 @dataclass(frozen=True)
 class LineFormat:
-    """How cells stand in a line.
+    """The format by which a line is divided into cells.
 
-    ``delimiter``: a name of DELIMITERS, a character, or "decimals:N": nothing between the numbers,
-    each has N digits after its point. ``label``: only lines that begin with it are frames; a
-    number, a colon or an equals sign may follow it. A line that is the label alone begins a frame
-    whose numbers stand in the lines after it. ``comment``: lines that begin so are passed over.
+    ``delimiter`` is a name in DELIMITERS, a character, or "decimals:N" for numbers without anything
+    between them, each with N digits after its point. If ``label`` is given, only lines that begin
+    with it are frames; a number, a colon or an equals sign may follow the label. A line with the
+    label alone begins a frame whose numbers are in the following lines. Lines that begin with one
+    of ``comment`` are ignored.
     """
 
     delimiter: str
@@ -45,7 +47,7 @@ class LineFormat:
             )
 
     def split(self, text: str) -> tuple[str, ...]:
-        """The cells of ``text``, a line without its label."""
+        """Return the cells of ``text``, a line without its label."""
         decimals = DECIMALS.fullmatch(self.delimiter)
         if decimals is not None:
             number = rf"\s*([-+]?\d*\.\d{{{decimals.group(1)}}})"
@@ -57,27 +59,27 @@ class LineFormat:
         return tuple(cell.strip().strip('"').strip() for cell in text.split(separator))
 
     def passed_over(self, line: str) -> bool:
-        """Whether ``line`` is empty or a comment."""
+        """Return whether ``line`` is empty or a comment."""
         return not line.strip() or line.lstrip().startswith(self.comment)
 
     def labelled(self, line: str) -> str | None:
-        """What follows the label; None where ``line`` does not begin with it."""
+        """Return the text after the label, or None if ``line`` does not begin with it."""
         assert self.label is not None
         match = re.match(rf"\s{{0,40}}{re.escape(self.label)}{AFTER_LABEL}", line)
         return None if match is None else line[match.end() :].rstrip()
 
 
 class LineReader:
-    """Puts rows together as lines come. ``wanted``: the cells of a row, where they are known: a
-    frame over several lines is then told as soon as it is whole."""
+    """Assembles rows as lines come. ``wanted`` is the number of cells of a row, if known; then a
+    frame over several lines is returned as soon as it is complete."""
 
     def __init__(self, form: LineFormat, wanted: int | None = None) -> None:
         self.form, self.wanted = form, wanted
-        self.passed_over = 0  # lines without the label, and not of a frame
-        self._open: Row | None = None  # begun by a label alone
+        self.passed_over = 0  # number of lines without the label that are not part of a frame
+        self._open: Row | None = None  # a row that was begun by a line with the label alone
 
     def feed(self, number: int, line: str) -> list[Row]:
-        """The rows that ``line`` ends or is."""
+        """Return the rows that ``line`` contains or completes."""
         form = self.form
         if form.passed_over(line):
             return self.finish()
@@ -98,12 +100,12 @@ class LineReader:
         return self.finish() if len(self._open.cells) == self.wanted else []
 
     def finish(self) -> list[Row]:
-        """The row that is open, where one is."""
+        """Return the open row, if there is one."""
         row, self._open = self._open, None
         return [] if row is None or not row.cells else [row]
 
     def _trimmed(self, cells: tuple[str, ...]) -> tuple[str, ...]:
-        """Without the empty cell that a delimiter at the line's end makes."""
+        """Return ``cells`` without the empty cell that a delimiter at the end of the line makes."""
         known = self.wanted is not None and len(cells) == self.wanted + 1
         return _without_end(cells) if known else cells
 
@@ -113,7 +115,7 @@ def _without_end(cells: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def parse_cell(cell: str) -> complex | None:
-    """The number in ``cell`` (real, complex with i or j, decimal comma), or None."""
+    """Return the number in ``cell`` (real, complex with i or j, decimal comma), or None."""
     if "_" in cell:
         return None
     for text in (
@@ -132,8 +134,9 @@ def parse_cell(cell: str) -> complex | None:
 
 
 def own_labels(lines: Sequence[str]) -> dict[str, int]:
-    """The labels that lines themselves show, "magnitudes" of "magnitudes : 1.5, 2.5", and how many
-    begin with each; empty where fewer than half of the lines with numbers begin with one."""
+    """Return the labels that the lines themselves show, such as "magnitudes" in "magnitudes : 1.5,
+    2.5", and how many lines begin with each. The result is empty unless more than half of the lines
+    with numbers begin with a label."""
     found: dict[str, int] = {}
     numbers = 0
     for line in lines:

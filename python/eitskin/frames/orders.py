@@ -1,5 +1,5 @@
-"""Channel orders: how others list a protocol's rows, how they number electrodes, and how rows are
-matched to ours."""
+"""Orders of rows: how others list the rows of a protocol and number electrodes, and how their rows
+are matched to ours."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from eitskin.skin.protocol import Protocol
 
 ORDERS = ("fixed", "rotating", "fixed-all", "rotating-all")
 
-# A row under another name, best first: as it is, both pairs turned, one turned (-1); then the same
-# of its reciprocal.
+# The names under which a row may be found, best first: as it is, with both pairs reversed, with one
+# pair reversed (sign -1); then the same for its reciprocal.
 PREFERENCE = tuple(
     ([columns[k] for k in flip], sign)
     for columns in ((0, 1, 2, 3), (2, 3, 0, 1))
@@ -23,19 +23,23 @@ PREFERENCE = tuple(
 
 @dataclass(frozen=True, eq=False)
 class RowMatch:
-    """Where each wanted row stands in a source: row ``index[r]`` times ``sign[r]`` (both (m,)
-    int64)."""
+    """The places of the wanted rows in a source: wanted row r equals row ``index[r]`` times
+    ``sign[r]`` (both (m,) int64)."""
 
     index: IntArray
     sign: IntArray
 
 
 def source_table(order: str, protocol: Protocol) -> IntArray:
-    """The rows [I+, I-, V+, V-] of ``protocol`` as a source in ``order`` lists them, (rows, 4).
+    """Return the rows [I+, I-, V+, V-] of ``protocol`` as a source in ``order`` lists them, (rows,
+    4).
 
-    "fixed": for each drive the measuring pairs ascend from electrode 0 (this project's order).
-    "rotating": they ascend from the drive's I+ onwards, modulo the number of electrodes. "-all":
-    pairs that touch a driving electrode, too.
+    With "fixed" the measuring pairs of each drive ascend from electrode 0 (this project's order).
+    With "rotating" they ascend from the drive's I+ onwards, modulo the number of electrodes. The
+    suffix "-all" includes pairs that touch a driving electrode.
+
+    Raises:
+        UsageError: the order is not known, or does not fit the protocol.
     """
     if order not in ORDERS:
         raise UsageError(
@@ -53,11 +57,13 @@ def source_table(order: str, protocol: Protocol) -> IntArray:
 
 
 def match_rows(source: IntArray, wanted: IntArray) -> RowMatch:
-    """Find each row of ``wanted`` (m, 4) in ``source`` (rows, 4), up to the direction of either
-    pair.
+    """Find each row of ``wanted`` (m, 4) in ``source`` (rows, 4); either pair may be reversed.
 
     A row that is not in the source is taken from its reciprocal (drive and measuring pair
-    exchanged) if that is there.
+    exchanged) if the source has that.
+
+    Raises:
+        FrameError: the source has neither.
     """
     place: dict[tuple[int, int, int, int], tuple[int, int]] = {}
     for columns, sign in PREFERENCE:
@@ -77,14 +83,15 @@ def match_rows(source: IntArray, wanted: IntArray) -> RowMatch:
 
 
 def electrode_map(n: int, rotate: int = 0, mirror: bool = False) -> IntArray:
-    """Our number of each source electrode, (n,): source 0 is our ``rotate``, then counting up
-    (``mirror``: down)."""
+    """Return our number of each source electrode, (n,): source 0 is our ``rotate``, and the next
+    ones count up, or down with ``mirror``."""
     steps = np.arange(n, dtype=np.int64)
     return np.asarray((rotate - steps if mirror else rotate + steps) % n)
 
 
 def swap_map(n: int, pairs: Iterable[Sequence[int]]) -> IntArray:
-    """The (n,) map that exchanges the electrodes of one pair, then those of the next, and so on."""
+    """Return the map (n,) that exchanges the electrodes of each of ``pairs``, one pair after the
+    other."""
     mapped = np.arange(n, dtype=np.int64)
     for pair in pairs:
         if len(set(pair)) != 2 or not all(0 <= electrode < n for electrode in pair):
@@ -97,12 +104,12 @@ def swap_map(n: int, pairs: Iterable[Sequence[int]]) -> IntArray:
 
 
 def relabel(rows: IntArray, electrodes: IntArray) -> IntArray:
-    """``rows`` (m, 4) with every electrode e replaced by ``electrodes[e]``."""
+    """Return ``rows`` (m, 4) with every electrode e replaced by ``electrodes[e]``."""
     return np.asarray(electrodes[np.asarray(rows)])
 
 
 def touching(rows: IntArray, electrodes: Iterable[int]) -> BoolArray:
-    """(m,) which rows use any of ``electrodes``."""
+    """Return which rows (m,) use any of ``electrodes``."""
     return np.asarray(np.isin(rows, list(electrodes)).any(axis=1))
 
 

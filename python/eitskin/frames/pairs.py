@@ -1,6 +1,6 @@
 """Complex numbers in pairs of columns: real and imaginary parts, or magnitudes and phases.
 
-A header that says which is believed; where nothing says it, nothing is assumed.
+If the header states which, it is believed; otherwise nothing is assumed.
 """
 
 import re
@@ -32,8 +32,8 @@ A_PART = {"imag": "an imaginary part", "phase": "a phase"}
 
 @dataclass(frozen=True)
 class Paired:
-    """Which of the chosen columns are first of a pair (real, magnitude) and which second, by
-    place; ``how`` is one of PAIRS."""
+    """The columns of each pair: ``first`` (real part or magnitude) and ``second``, by their place
+    among the chosen columns. ``how`` is one of PAIRS."""
 
     first: tuple[int, ...]
     second: tuple[int, ...]
@@ -41,80 +41,89 @@ class Paired:
 
 
 def kind_of(name: str) -> str | None:
-    """What a header's ``name`` says its column is: "magnitude", "phase", "real", "imag" or None."""
+    """Return what the header's ``name`` states about its column: "magnitude", "phase", "real",
+    "imag" or None."""
     kinds = {KIND[word] for word in _words(name) if word in KIND}
     return kinds.pop() if len(kinds) == 1 else None
 
 
 def refuse_parts(names: Sequence[str], option: str) -> None:
-    """Refuse columns that the header calls phases or imaginary parts, where no complex part is
-    asked for."""
+    """Reject columns that the header calls phases or imaginary parts, for use when no complex part
+    was asked for."""
     for name in names:
         kind = kind_of(name)
         if kind in A_PART:
             raise UsageError(
-                f"{option}: column {name!r} is {A_PART[kind]}, no voltage of its own; choose the"
+                f"{option}: column {name!r} is {A_PART[kind]}, not a voltage; choose the"
                 " others only, or the pairs with  --complex-part in-phase"
             )
 
 
 def all_magnitudes(names: Sequence[str]) -> bool:
-    """Whether the header calls every one of ``names`` a magnitude."""
+    """Return whether the header calls every one of ``names`` a magnitude."""
     return bool(names) and all(kind_of(name) == "magnitude" for name in names)
 
 
 def paired(names: Sequence[str], values: AnyArray, how: str | None, option: str) -> Paired:
-    """How the columns of ``values`` (rows, c) with these ``names`` (empty: no header) are pairs."""
+    """Return how the columns of ``values`` (rows, c) with these ``names`` (empty: no header) form
+    pairs.
+
+    Raises:
+        UsageError: they do not form pairs, or the kind of the pairs is unknown or contradicts the
+            header.
+    """
     count = values.shape[1]
     if count % 2:
         raise UsageError(f"{option}: with --complex-part columns come in pairs; {count} are named")
     kinds = [kind_of(name) for name in names] if names else [None] * count
-    said = {HALVES[kind] for kind in kinds if kind is not None}
-    if len(said) > 1 or (said and None in kinds):
+    forms = {HALVES[kind] for kind in kinds if kind is not None}
+    if len(forms) > 1 or (forms and None in kinds):
         if how is None:
             raise UsageError(
                 f"{option}: the header does not say of every column what it is"
                 f" ({first_few(names, SHOWN)}); say --pairs {' | '.join(PAIRS)}"
             )
-        said = set()
-    if not said:
+        forms = set()
+    if not forms:
         return _by_place(values, how, option)
-    halves = ("real", "imag") if said == {"real-imag"} else ("magnitude", "phase")
+    halves = ("real", "imag") if forms == {"real-imag"} else ("magnitude", "phase")
     first, second = (tuple(k for k, kind in enumerate(kinds) if kind == half) for half in halves)
     if len(first) != len(second):
         raise UsageError(
             f"{option}: {len(first)} columns of {halves[0]}s and {len(second)} of {halves[1]}s"
-            " make no pairs; choose as many of each"
+            " do not form pairs; choose as many of each"
         )
-    told = "real-imag" if said == {"real-imag"} else _polar([names[k] for k in second], how, option)
-    if how is not None and how != told:
+    if forms == {"real-imag"}:
+        stated = "real-imag"
+    else:
+        stated = _polar([names[k] for k in second], how, option)
+    if how is not None and how != stated:
         raise UsageError(
-            f"--pairs {how}: the header says {told} ({first_few(names, SHOWN)}); leave --pairs out,"
-            " or the header with --header-rows"
+            f"--pairs {how}: the header says {stated} ({first_few(names, SHOWN)}); leave out"
+            " --pairs, or the header with --header-rows"
         )
-    return _checked(values, Paired(first, second, told), option)
+    return _checked(values, Paired(first, second, stated), option)
 
 
 def _checked(values: AnyArray, pairs: Paired, option: str) -> Paired:
-    """``pairs``, unless the numbers cannot be such."""
+    """Return ``pairs``, or raise a UsageError if the numbers cannot be such pairs."""
     if pairs.how == "real-imag":
         return pairs
     if (values[:, list(pairs.first)] < 0).any():
         raise UsageError(
-            f"{option}: a magnitude is below 0, so these are no pairs of magnitude and phase; say"
+            f"{option}: a magnitude is below 0, so these are not pairs of magnitude and phase; say"
             " --pairs real-imag, or choose other columns"
         )
     largest = np.nanmax(np.abs(values[:, list(pairs.second)]), initial=0.0)
     if pairs.how == "magnitude-radians" and largest > MOST_RADIANS:
         raise UsageError(
-            f"{option}: a phase of {largest:g} is no number of radians; say --pairs"
-            " magnitude-degrees"
+            f"{option}: a phase of {largest:g} cannot be in radians; say --pairs magnitude-degrees"
         )
     return pairs
 
 
 def to_complex(values: AnyArray, pairs: Paired) -> ComplexArray:
-    """Columns (rows, c) as complex (rows, c / 2)."""
+    """Return the columns (rows, c) as complex numbers (rows, c / 2)."""
     first, second = values[:, list(pairs.first)], values[:, list(pairs.second)]
     if pairs.how == "real-imag":
         return np.asarray(first + 1j * second)
@@ -124,7 +133,7 @@ def to_complex(values: AnyArray, pairs: Paired) -> ComplexArray:
 
 def _by_place(values: AnyArray, how: str | None, option: str) -> Paired:
     if how is None and (values[:, 0::2] < 0).any():
-        how = "real-imag"  # no magnitude is below 0
+        how = "real-imag"  # a magnitude is never below 0
     if how is None:
         raise UsageError(
             f"{option}: nothing says whether the pairs are real and imaginary parts or magnitudes"

@@ -1,4 +1,5 @@
-"""Where touches truly were at any instant, for frames whose rows have instants of their own."""
+"""The true places of touches at any instant, for frames whose rows are measured at different
+instants."""
 
 from dataclasses import dataclass, fields
 
@@ -12,11 +13,12 @@ NAMES = ("path_touch", "path_time_s", "path_xy_mm", "path_radius_mm", "path_stre
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """Points (i,) of touches' ways, straight lines between a touch's neighbouring ones.
+    """Points (i,) on the paths of touches, which are straight between consecutive points.
 
-    ``path_touch`` numbers the touch, ascending; ``path_time_s`` ascends within a touch, on the axis
-    of the frames' ``time_s``; ``path_xy_mm`` (i, 2), ``path_radius_mm`` and ``path_strength`` are
-    as the frames' touch fields. A touch is there from its first point to its last.
+    ``path_touch`` is the number of the touch, ascending. ``path_time_s`` ascends within a touch, on
+    the same axis as the frames' ``time_s``. ``path_xy_mm`` (i, 2), ``path_radius_mm`` and
+    ``path_strength`` are defined like the frames' touch fields. A touch exists from its first point
+    to its last.
     """
 
     path_touch: IntArray
@@ -37,7 +39,8 @@ class Paths:
             raise FrameError("path_touch must ascend, and path_time_s within a touch")
 
     def at(self, time_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """What is there at ``time_s``: places (k, 2) in mm, radii (k,) in mm, strengths (k,)."""
+        """Return the touches at ``time_s``: places (k, 2) in mm, radii (k,) in mm, strengths
+        (k,)."""
         found = []
         for number in np.unique(self.path_touch):
             own = np.flatnonzero(self.path_touch == number)

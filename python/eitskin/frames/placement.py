@@ -1,5 +1,5 @@
-"""Where each channel of a frame comes from, in a source's own order: electrodes renumbered, rows in
-a protocol's order, signs."""
+"""The origin of each row of a frame in the order of a source: electrodes are renumbered, rows put
+in the order of a protocol, and signs set."""
 
 from dataclasses import dataclass
 
@@ -32,8 +32,13 @@ def source_rows(
     n: int,
     where: str,
 ) -> IntArray:
-    """The rows [I+, I-, V+, V-] of a source in its own order, in our numbers, (rows, 4). ``own``:
-    the source's own table."""
+    """Return the rows [I+, I-, V+, V-] of a source in its own order, with our electrode numbers,
+    (rows, 4). ``own`` is the source's own table.
+
+    Raises:
+        UsageError, FrameError: no protocol is given, or the table names electrodes that do not
+            exist.
+    """
     given = table_rows(options)
     given = own if given is None else given
     if given is None:
@@ -54,7 +59,8 @@ def source_rows(
 
 
 def table_rows(options: ImportOptions) -> IntArray | None:
-    """The source's rows as the options themselves, or the file that they name, list them."""
+    """Return the source's rows as listed in the options themselves or in the file that they name;
+    None if there are none."""
     if options.table is not None:
         return np.asarray(options.table, dtype=np.int64).reshape(-1, 4)
     if options.table_file is None:
@@ -69,9 +75,12 @@ def table_rows(options: ImportOptions) -> IntArray | None:
 
 @dataclass(frozen=True, eq=False)
 class RowPlacement:
-    """From frames as a source lists them to a model's rows: row r is ``sign[r]`` times the source's
-    channel ``index[r]`` (``magnitude``: times its size), and unusable where ``blank[r]``.
-    ``channels``: of a source's frame."""
+    """The map from frames as a source lists them to the rows of a model.
+
+    Row r is ``sign[r]`` times the source's channel ``index[r]`` (with ``magnitude``: times its
+    magnitude), and it is unusable if ``blank[r]``. ``channels`` is the number of channels in a
+    frame of the source.
+    """
 
     channels: int
     index: IntArray
@@ -80,8 +89,8 @@ class RowPlacement:
     magnitude: bool
 
     def frame(self, values: AnyArray) -> AnyArray:
-        """A frame (m,) of ``values`` (channels,), real or complex; NaN is a row that cannot be
-        used."""
+        """Return the frame (m,) for ``values`` (channels,), real or complex; NaN marks a row that
+        cannot be used."""
         placed = values[self.index]
         if self.magnitude:
             placed = np.abs(placed)
@@ -91,8 +100,13 @@ class RowPlacement:
 def place(
     options: ImportOptions, protocol: Protocol | None, model: Model, where: str
 ) -> RowPlacement:
-    """How frames that stand as ``options`` say come to the rows of ``model``; ``protocol``: the
-    source's, None: the model's."""
+    """Return how frames in the form that ``options`` describe map to the rows of ``model``.
+    ``protocol`` is the source's; None means the model's.
+
+    Raises:
+        UsageError, FrameError: an option needs a whole file, names a row that does not exist, or
+            the frames lack rows of the model.
+    """
     if options.equalise:
         raise UsageError(
             f"{where}: equalise needs a whole file; take it out, or calibrate:  eitskin calibrate"
@@ -100,7 +114,7 @@ def place(
     n, wanted = model.protocol.n_electrodes, model.protocol
     try:
         skin: Skin | None = model.skin
-    except Exception:  # a model without a description of its skin: numbered counter-clockwise
+    except Exception:  # without a description, the skin counts as numbered counterclockwise
         skin = None
     rows = source_rows(options, None, protocol or wanted, skin, n, where)
     rows = relabel(rows, swap_map(n, options.swaps))
@@ -109,8 +123,8 @@ def place(
         match = match_rows(rows, measured)
     except FrameError:
         raise FrameError(
-            f"{where}: its frames have not all rows of the model's protocol; name the protocol that"
-            " they are of in the layout, or take a model for it"
+            f"{where}: its frames lack rows of the model's protocol; name the protocol of the"
+            " frames in the layout, or use a model for that protocol"
         ) from None
     sign = match.sign.astype(np.float64)
     magnitude = options.sign == "magnitude"
@@ -132,7 +146,8 @@ def place(
 
 
 def _expected(model: Model) -> FloatArray:
-    """The model's own voltages of the untouched skin (m,); 0 of rows that it does not use."""
+    """Return the model's own voltages of the untouched skin (m,), 0 for rows that it does not
+    use."""
     expected = np.zeros(model.protocol.n_rows)
     fold = model.fold
     expected[fold.first] = model.v_ref_v

@@ -1,5 +1,5 @@
-"""What import does to channels: their sign, filling them from reciprocals, leaving them out, making
-gains equal."""
+"""The repairs of import: change signs, fill rows from reciprocals, leave rows out, equalise
+gains."""
 
 from collections.abc import Iterable, Sequence
 
@@ -15,8 +15,8 @@ MIN_GAIN = 0.05
 
 
 def signed(values: FloatArray, sign: str, prediction: FloatArray | None) -> FloatArray:
-    """``values`` (n, m) as they are, negated, or their magnitudes with the signs of ``prediction``
-    (m,)."""
+    """Return ``values`` (n, m) unchanged, negated, or their magnitudes with the signs of
+    ``prediction`` (m,)."""
     if sign not in SIGNS:
         raise UsageError(f"--sign {sign}: use one of {', '.join(SIGNS)}")
     if sign == "magnitude" and prediction is not None:
@@ -25,7 +25,7 @@ def signed(values: FloatArray, sign: str, prediction: FloatArray | None) -> Floa
 
 
 def flipped(values: FloatArray, channels: Sequence[int]) -> FloatArray:
-    """``values`` (n, m) with the sign of ``channels`` changed."""
+    """Return ``values`` (n, m) with the sign of ``channels`` changed."""
     check_range(channels, values.shape[1], "--flip-channels")
     sign = np.ones(values.shape[1])
     sign[list(channels)] = -1.0
@@ -33,7 +33,7 @@ def flipped(values: FloatArray, channels: Sequence[int]) -> FloatArray:
 
 
 def partners(rows: IntArray, n_electrodes: int) -> dict[int, tuple[int, int]]:
-    """For each channel that has a reciprocal one in ``rows`` (m, 4): that channel and the sign
+    """Return for each row that has a reciprocal in ``rows`` (m, 4) that reciprocal and the sign
     between them."""
     pairs = table(n_electrodes, rows).reciprocal_pairs()
     partner: dict[int, tuple[int, int]] = {}
@@ -48,8 +48,8 @@ def partners(rows: IntArray, n_electrodes: int) -> dict[int, tuple[int, int]]:
 def kept_channels(
     rows: IntArray, n_electrodes: int, drop_channels: Sequence[int], drop_electrodes: Sequence[int]
 ) -> BoolArray:
-    """Which channels (m,) stay when ``drop_channels`` and all channels that use ``drop_electrodes``
-    go."""
+    """Return which rows (m,) remain when ``drop_channels`` and all rows that use
+    ``drop_electrodes`` are left out."""
     check_range(drop_electrodes, n_electrodes, "--drop-electrodes")
     check_range(drop_channels, len(rows), "--drop-channels")
     keep = ~touching(rows, drop_electrodes)
@@ -62,7 +62,8 @@ def kept_channels(
 def imputed(
     values: FloatArray, rows: IntArray, n_electrodes: int, channels: Sequence[int]
 ) -> FloatArray:
-    """``values`` (n, m) with ``channels`` replaced by their reciprocals among ``rows`` (m, 4)."""
+    """Return ``values`` (n, m) with ``channels`` replaced by their reciprocals among ``rows`` (m,
+    4)."""
     check_range(channels, len(rows), "--impute-channels")
     filled = values.copy()
     for channel, (other, sign) in good_reciprocals(channels, rows, n_electrodes).items():
@@ -73,7 +74,8 @@ def imputed(
 def good_reciprocals(
     channels: Sequence[int], rows: IntArray, n_electrodes: int
 ) -> dict[int, tuple[int, int]]:
-    """For each of ``channels`` the one that fills it, which is none of them, and the sign."""
+    """Return for each of ``channels`` the reciprocal that fills it, which must not be one of them,
+    and the sign."""
     partner = partners(rows, n_electrodes) if channels else {}
     for channel in channels:
         if channel not in partner or partner[channel][0] in channels:
@@ -85,7 +87,12 @@ def good_reciprocals(
 
 
 def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArray:
-    """Gains (m,), of median 1, that make ``reference`` (m,) a multiple of ``prediction`` (m,)."""
+    """Return gains (m,) with median 1 that make ``reference`` (m,) a multiple of ``prediction``
+    (m,).
+
+    Raises:
+        FrameError: a row is so weak that its gain would only raise noise.
+    """
     ratio = reference / prediction
     relative = ratio / np.median(ratio)
     weak = np.flatnonzero(~(relative > MIN_GAIN))
@@ -99,7 +106,7 @@ def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArra
 
 
 def check_range(numbers: Iterable[int], count: int, option: str) -> None:
-    """Refuse ``numbers`` that are not 0 to ``count`` - 1."""
+    """Raise a UsageError unless all ``numbers`` are 0 to ``count`` - 1."""
     for number in numbers:
         if not 0 <= number < count:
             raise UsageError(f"{option} {number}: out of range; there are 0 to {count - 1}")

@@ -1,4 +1,4 @@
-"""Results as a file: images, touches and solver info of each frame, named and with units
+"""Results as a file: images, touches and solver info of each frame, with names and units
 (docs/reference/frames-format.md)."""
 
 import json
@@ -19,7 +19,7 @@ VERSION = 2
 def save_results(
     path: str | Path, model: Model, frames: Frames, results: dict[int, Reconstruction]
 ) -> None:
-    """Write the ``results`` by frame number to ``path`` (.npz), whole or not at all."""
+    """Write the ``results``, by frame number, to ``path`` (.npz), completely or not at all."""
     numbers = sorted(results)
     touches = [(number, touch) for number in numbers for touch in results[number].touches]
     grid = model.grid

@@ -1,5 +1,5 @@
-"""A measured source, text, NPY, NPZ or MAT, read into frames of channels that still stand in
-its own order."""
+"""Read a measured source (text, NPY, NPZ or MAT) as frames whose channels are still in the source's
+own order."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -23,16 +23,19 @@ COMPLEX_PARTS = ("real", "imag", "abs", "in-phase")
 
 @dataclass(frozen=True)
 class SourceOptions:
-    """Where in a source the frames are.
+    """The places of frames in a source.
 
-    NPZ and MAT: ``voltage``, ``reference``, ``names``, ``time``, ``protocol_table`` name arrays.
-    Text: ``columns`` and ``reference_columns`` choose columns ("2", "0,2", "1:209", "0:416:2",
-    header names), ``time`` one column, whose numbers times ``time_scale`` are seconds.
-    ``reference_frames`` chooses quiet frames among the frames. ``scale`` turns the source's numbers
-    into volts (None: unknown, taken as 1). ``frames_in`` says which side of a table frames are.
-    ``complex_part``: what to keep of complex numbers; in text, columns then come in ``pairs``, one
-    of PAIRS (None: as the header says). ``delimiter``, ``label``, ``comment`` as in
-    ``lines.LineFormat``; ``cells``: of each line, where that is known.
+    For NPZ and MAT, ``voltage``, ``reference``, ``names``, ``time`` and ``protocol_table`` name
+    arrays. For text, ``columns`` and ``reference_columns`` choose columns ("2", "0,2", "1:209",
+    "0:416:2", header names), and ``time`` one column, whose numbers times ``time_scale`` are
+    seconds.
+
+    ``reference_frames`` chooses the untouched frames among the frames. ``scale`` converts the
+    source's numbers to V (None: unknown, taken as 1). ``frames_in`` tells whether the frames of a
+    table are rows or columns. ``complex_part`` is what to keep of complex numbers; in text, columns
+    then come in ``pairs``, one of PAIRS (None: as the header says). ``delimiter``, ``label`` and
+    ``comment`` are as in ``lines.LineFormat``; ``cells`` is the number of cells in each line, if
+    known.
     """
 
     voltage: str | None = None
@@ -59,8 +62,9 @@ class SourceOptions:
 
 @dataclass(frozen=True, eq=False)
 class ReadText:
-    """How the lines of a text with frames in rows were read: their form, the cells of each, which
-    of them are the channels' (in pairs the first and the second ones), which is the time."""
+    """The way in which a text with frames in rows was read: the form of its lines, the number of
+    cells in each, the columns of the channels (in pairs the first and the second by turns), and the
+    column of the time."""
 
     form: LineFormat
     header_rows: int
@@ -72,11 +76,11 @@ class ReadText:
 
 @dataclass(frozen=True, eq=False)
 class RawFrames:
-    """Frames as the source orders them: ``voltage`` (n, rows), ``reference`` (k, rows) or None
-    where none was named.
+    """Frames in the order of the source: ``voltage`` (n, rows), and ``reference`` (k, rows) or None
+    if none was named.
 
-    ``table`` (rows, 4) where the source has one, ``arrays`` everything an NPZ or MAT file holds.
-    ``notes``: what a user should know. ``text``: how text was read.
+    ``table`` (rows, 4) is the source's own protocol, if it has one. ``arrays`` is everything that
+    an NPZ or MAT file holds. ``notes`` are for the user. ``text`` describes how text was read.
     """
 
     voltage: FloatArray
@@ -90,7 +94,7 @@ class RawFrames:
 
 
 def is_frames_file(path: str | Path) -> bool:
-    """Whether ``path`` is an .npz in this project's frames format (of any version)."""
+    """Return whether ``path`` is an .npz in this project's frames format, of any version."""
     if Path(path).suffix.lower() != ".npz":
         return False
     return str(read_npz(path, "file of arrays", ("format",)).get("format")) == FORMAT
@@ -99,14 +103,14 @@ def is_frames_file(path: str | Path) -> bool:
 def read_source(
     path: str | Path, options: SourceOptions, row_counts: Iterable[int], asked: str
 ) -> RawFrames:
-    """Read ``path``; a frame may have any of ``row_counts`` channels, and ``asked`` says why in
+    """Read ``path``. A frame may have any of ``row_counts`` channels; ``asked`` gives the reason in
     errors.
 
     Raises:
         FileError: the file cannot be read.
-        UsageError: options that contradict each other or the kind of file.
-        FrameError: an array or column is absent, of another shape, or no numbers.
-        MissingExtraError: a .mat file without scipy.
+        UsageError: options contradict each other or the kind of file.
+        FrameError: an array or column is missing, has another shape, or holds no numbers.
+        MissingExtraError: a .mat file needs scipy.
     """
     suffix = Path(path).suffix.lower()
     _check_words(options)
@@ -121,8 +125,8 @@ def read_source(
 
 
 def electrode_table(rows: AnyArray, base: int, where: str) -> IntArray:
-    """A source's protocol table as (rows, 4) electrodes from 0; ``base`` is the source's number of
-    its first electrode."""
+    """Return a source's protocol table as (rows, 4) electrodes from 0; ``base`` is the source's
+    number of its first electrode."""
     table = np.asarray(rows)
     if (
         table.ndim != 2
@@ -139,6 +143,7 @@ def electrode_table(rows: AnyArray, base: int, where: str) -> IntArray:
 
 
 def refuse_nonfinite(raw: RawFrames, where: str) -> None:
+    """Raise a FrameError if a voltage is not finite."""
     for what, values in (("frames", raw.voltage), ("reference", raw.reference)):
         bad = np.argwhere(~np.isfinite(values)) if values is not None else np.zeros((0, 2))
         if values is not None and len(bad):
@@ -234,7 +239,7 @@ def _numbers(
     option: str,
     notes: list[str],
 ) -> tuple[AnyArray, Paired | None]:
-    """The chosen columns as numbers, pairs as complex ones, and how they were pairs."""
+    """Return the chosen columns as numbers (complex for pairs), and how they formed pairs."""
     values = table.numbers(columns)
     names = tuple(table.header[k] for k in columns) if table.header else ()
     if options.complex_part is None:
@@ -251,7 +256,7 @@ def _numbers(
 
 
 def _interleaved(columns: tuple[int, ...], pairs: Paired) -> tuple[int, ...]:
-    """The columns of ``pairs``, first and second by turns."""
+    """Return the columns of ``pairs``, first and second by turns."""
     both = zip(pairs.first, pairs.second, strict=True)
     return tuple(columns[k] for pair in both for k in pair)
 
@@ -299,7 +304,7 @@ def _from_arrays(
 
 def _times(values: AnyArray, where: str) -> FloatArray:
     if values.dtype.kind not in "fiu":
-        raise FrameError(f"{where}: holds {values.dtype}, no times")
+        raise FrameError(f"{where}: holds {values.dtype}, not times")
     return np.atleast_1d(values).ravel().astype(np.float64)
 
 
@@ -312,7 +317,8 @@ def _finish(
     arrays: Mapping[str, AnyArray],
     options: SourceOptions,
 ) -> RawFrames:
-    """Quiet frames taken out of the frames, complex numbers made real, everything scaled."""
+    """Separate the untouched frames from the others, convert complex numbers to real ones, and
+    scale everything."""
     if options.reference_frames is not None:
         if reference is not None:
             raise UsageError("--reference-frames does not go with another reference; name one")
@@ -347,8 +353,8 @@ def _finish(
 
 
 def _common_phase(values: AnyArray) -> float:
-    """The phase (radians, within +-pi/2) that puts most of ``values`` on the real axis: half the
-    angle of sum z^2."""
+    """Return the phase (radians, within +-pi/2) that brings ``values`` closest to the real axis:
+    half the angle of sum z^2."""
     finite = np.asarray(values)[np.isfinite(values)]
     return float(np.angle((finite.astype(np.complex128) ** 2).sum()) / 2)
 
@@ -372,12 +378,12 @@ def _frames_of(
     where: str,
     asked: str,
 ) -> tuple[AnyArray, bool | None]:
-    """The array ``key`` as (frames, channels), and whether its frames were rows (None: it is one
-    frame)."""
+    """Return the array ``key`` as (frames, channels), and whether its frames were rows (None: it is
+    one frame)."""
     values = pick(arrays, key, option, where)
     where = f"{where}: {key} {values.shape}"
     if values.dtype.kind not in "fiuc":
-        raise FrameError(f"{where}: holds {values.dtype}, no numbers")
+        raise FrameError(f"{where}: holds {values.dtype}, not numbers")
     if values.ndim == 1 and len(values) in row_counts:
         return values[None, :], None
     if values.ndim != 2:

@@ -1,5 +1,5 @@
-"""Text tables of numbers as instruments write them: delimiter, header, label, decimal comma found,
-bad cells named."""
+"""Read text tables of numbers from instruments. Delimiter, header, label and decimal comma are
+detected, and bad cells are named."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -23,13 +23,13 @@ from eitskin.frames.lines import (
 
 MAX_BYTES = 1_000_000_000
 SNIFFED_LINES = 50
-LONGEST = 200  # of a list in a message, in characters
+LONGEST = 200  # characters of a list in a message
 
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table still as text: ``cells`` in rows of equal length, each row's ``line`` (from 1),
-    ``header`` names, the ``form`` of its lines, ``notes`` on lines that were left out."""
+    """A table as text: ``cells`` in rows of equal length, the ``line`` of each row (from 1),
+    ``header`` names, the ``form`` of its lines, and ``notes`` on lines that were left out."""
 
     path: str
     cells: tuple[tuple[str, ...], ...]
@@ -44,8 +44,12 @@ class TextTable:
         return len(self.cells[0])
 
     def numbers(self, columns: Sequence[int]) -> AnyArray:
-        """The chosen ``columns`` as numbers, (rows, len(columns)), complex where a cell is like
-        1.5-2j, else float."""
+        """Return the chosen ``columns`` as numbers, (rows, len(columns)): complex if a cell is like
+        1.5-2j, otherwise float.
+
+        Raises:
+            FrameError: a cell is not a number.
+        """
         values: list[list[complex]] = []
         for cells, line in zip(self.cells, self.line, strict=True):
             row = []
@@ -73,15 +77,16 @@ def read_table(
     comment: tuple[str, ...] = COMMENT,
     cells: int | None = None,
 ) -> TextTable:
-    """Read a text table. ``delimiter`` and ``label`` as in ``LineFormat``; None finds them, as it
-    does ``header_rows``. ``skip_bad_lines`` leaves lines of another length than most out.
+    """Read a text table. ``delimiter`` and ``label`` are as in ``LineFormat``; these and
+    ``header_rows`` are detected if None. ``skip_bad_lines`` leaves out lines whose length differs
+    from most.
 
-    Empty lines and lines that begin with # or % are passed over.
+    Empty lines and lines that begin with # or % are ignored.
 
     Raises:
         FileError: the file cannot be read.
-        UsageError: the delimiter is not one, or there are several labels.
-        FrameError: it is no text, holds no rows, or its rows differ in length.
+        UsageError: the delimiter is not valid, or there are several labels.
+        FrameError: it is not text, has no rows, or its rows differ in length.
     """
     content = read_bytes(path, "table", MAX_BYTES)
     if b"\0" in content[:4096]:
@@ -92,8 +97,8 @@ def read_table(
     reader = LineReader(form)
     rows = [row for number, line in lines for row in reader.feed(number, line)] + reader.finish()
     if not rows:
-        said = "" if form.label is None else f" that begin with {form.label!r}"
-        raise FrameError(f"{path}: the table has no rows{said}")
+        labelled = "" if form.label is None else f" that begin with {form.label!r}"
+        raise FrameError(f"{path}: the table has no rows{labelled}")
     notes = []
     if reader.passed_over:
         notes.append(f"{reader.passed_over} lines without the label {form.label!r} passed over")
@@ -128,7 +133,7 @@ def read_table(
 
 
 def decoded(content: bytes) -> str:
-    """Text as instruments write it: UTF-8, else Latin-1."""
+    """Return text as instruments write it: UTF-8, otherwise Latin-1."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -138,7 +143,7 @@ def decoded(content: bytes) -> str:
 def _found_form(
     lines: Sequence[str], find_delimiter: bool, form: LineFormat, where: str
 ) -> LineFormat:
-    """``form``, with what of the lines was not named found in them."""
+    """Return ``form``, completed by what can be detected in the lines."""
     lines = [line for line in lines if not form.passed_over(line)]
     if form.label is None and (found := own_labels(lines)):
         if len(found) > 1:
@@ -155,20 +160,21 @@ def _found_form(
 
 
 def _without_ends(rows: list[Row]) -> list[Row]:
-    """Without the last cell where every line ends in a delimiter."""
+    """Return the rows without their last cell if every line ends in a delimiter."""
     if rows and all(len(row.cells) > 1 and not row.cells[-1] for row in rows):
         return [Row(row.line, row.cells[:-1]) for row in rows]
     return rows
 
 
 def _even(rows: list[Row], cells: int | None, notes: list[str]) -> list[Row]:
-    """The rows of ``cells``, or of the length that most have; what is left out is noted."""
+    """Return the rows with ``cells`` cells, or with the most frequent length; a note counts the
+    rows left out."""
     width = cells or Counter(len(row.cells) for row in rows).most_common(1)[0][0]
     bad = [row for row in rows if len(row.cells) != width]
     if bad:
         notes.append(
-            f"{len(bad)} lines left out that have not {width} cells, first line {bad[0].line} with"
-            f" {len(bad[0].cells)}"
+            f"{len(bad)} lines left out that do not have {width} cells, first line {bad[0].line}"
+            f" with {len(bad[0].cells)}"
         )
     left = [row for row in rows if len(row.cells) == width]
     if not left:
@@ -177,8 +183,12 @@ def _even(rows: list[Row], cells: int | None, notes: list[str]) -> list[Row]:
 
 
 def chosen(spec: str, count: int, names: Sequence[str], option: str) -> tuple[int, ...]:
-    """The indices that ``spec`` names among ``count``: "2", "0,2", "1:209", "0:416:2", "3:" or
-    names from a header, by commas."""
+    """Return the indices that ``spec`` names among ``count``: "2", "0,2", "1:209", "0:416:2", "3:"
+    or names from a header, separated by commas.
+
+    Raises:
+        UsageError: a part is not valid or out of range.
+    """
     indices: list[int] = []
     for part in (piece.strip() for piece in spec.split(",")):
         if part in names:
@@ -195,7 +205,7 @@ def chosen(spec: str, count: int, names: Sequence[str], option: str) -> tuple[in
         except ValueError:
             known = f"; names are {_cut(', '.join(names))}" if names else ""
             raise UsageError(
-                f"{option} {_cut(spec)}: {part!r} is no number, range a:b or a:b:step, or header"
+                f"{option} {_cut(spec)}: {part!r} is not a number, range a:b or a:b:step, or header"
                 f" name{known}"
             ) from None
         if not 0 <= start < stop <= count or step < 1:
@@ -207,12 +217,12 @@ def chosen(spec: str, count: int, names: Sequence[str], option: str) -> tuple[in
 
 
 def _cut(text: str) -> str:
-    """``text`` for a message, not longer than a line or two."""
+    """Return ``text`` for a message, not longer than a line or two."""
     return text if len(text) <= LONGEST else f"{text[:LONGEST].rstrip(', ')}, ..."
 
 
 def _sniffed(lines: Sequence[str]) -> str:
-    """The delimiter under which the most cells are numbers, then the most cells."""
+    """Return the delimiter that makes the most cells numbers, and then the most cells."""
     sample = lines[-SNIFFED_LINES:]
 
     def score(delimiter: str) -> tuple[float, float]:
@@ -227,7 +237,8 @@ def _sniffed(lines: Sequence[str]) -> str:
 
 
 def _header_length(rows: Sequence[Sequence[str]]) -> int:
-    """How many leading rows are less than half numbers."""
+    """Return how many rows at the start hold mostly words: less than half of their cells are
+    numbers."""
     for k, cells in enumerate(rows):
         if 2 * sum(parse_cell(cell) is not None for cell in cells) >= max(len(cells), 1):
             return k

@@ -1,5 +1,5 @@
-"""What a source says about its own scenes: touches and masks, turned into the frames file's
-units."""
+"""The truth that a source holds about its own scenes: touches and masks, converted to the units of
+the frames file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,12 +14,13 @@ from eitskin.frames.arrays import pick
 
 @dataclass(frozen=True)
 class TruthOptions:
-    """Names of the source's arrays, and their units.
+    """The names of the source's arrays, and their units.
 
-    ``touch_frame`` (t,) frame index from 0 or frame name, ``touch_xy`` (t, 2) and ``touch_radius``
-    (t,) in units of ``touch_unit_mm``, ``touch_strength`` (t,) relative conductivity change,
-    ``touch_sign`` (t,) true or above 0: more conductive. ``mask`` (n, h, w) +1/-1/0 over
-    ``mask_extent_mm``; ``mask_top_first``: its row 0 is the highest y.
+    ``touch_frame`` (t,) is a frame index from 0 or a frame name. ``touch_xy`` (t, 2) and
+    ``touch_radius`` (t,) are in units of ``touch_unit_mm``. ``touch_strength`` (t,) is the relative
+    conductivity change. ``touch_sign`` (t,) is true or above 0 for a more conductive touch.
+    ``mask`` (n, h, w) is +1, -1 or 0 over ``mask_extent_mm``; with ``mask_top_first`` its row 0 has
+    the highest y.
     """
 
     touch_frame: str | None = None
@@ -40,8 +41,8 @@ def truth_fields(
     box_mm: tuple[float, float, float, float] | None,
     where: str,
 ) -> dict[str, Any]:
-    """The truth fields of ``Frames`` that ``options`` ask for; ``names`` of the frames, ``box_mm``
-    of the skin."""
+    """Return the truth fields of ``Frames`` that ``options`` ask for; ``names`` are those of the
+    frames, ``box_mm`` is the bounding box of the skin."""
     return _touches(arrays, options, names, where) | _mask(arrays, options, box_mm, where)
 
 
@@ -80,7 +81,7 @@ def _touches(
     def scaled(name: str, unit: float = 1.0) -> FloatArray:
         values = picked[name]
         if values.dtype.kind not in "fiub":
-            raise FrameError(f"{where}: {keys[name]}: holds {values.dtype}, no numbers")
+            raise FrameError(f"{where}: {keys[name]}: holds {values.dtype}, not numbers")
         return np.asarray(values, dtype=np.float64) * unit
 
     fields: dict[str, Any] = {"touch_frame": frame}

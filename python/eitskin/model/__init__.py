@@ -1,1 +1,1 @@
-"""The stored model: reduction, the .eitm file, and how one is built."""
+"""The stored model: how it is built and reduced, and the .eitm file that holds it."""

@@ -1,5 +1,5 @@
-"""From a skin's description to a model: mesh, forward model, Jacobian, reduction, storage, golden
-frame."""
+"""Build a model from a skin's description: mesh, forward model, Jacobian, reduction, storage,
+golden frame."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -34,21 +34,21 @@ from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY, Uncertainty
 LIPSCHITZ_MARGIN = 1e-4
 FIELD_PEAK = 1024.0
 MIN_RATIO_REFERENCE = 1e-6
-# a disc of contrast c in a sheet of conductivity s answers as a change of 2 (c - 1) / (c + 1) s:
-# for c = 3 to 10, 1.0 to 1.64 s
+# A disc of contrast c in a skin of conductivity s acts like a change of 2 (c - 1) / (c + 1) s,
+# which is 1.0 to 1.64 s for c = 3 to 10.
 TOUCH_CHANGE_RATIO = 1.35
-# the logarithm draws strong touches together, so that their data say little of the radius and
-# strength must
+# The logarithm compresses strong touches, so their data say little about the radius, and the
+# expected change has to fix it instead.
 LOG_RADIUS_WEIGHT = 1.0
-# elements of the mesh for model errors: with 3000, errors of shaped touches are 15 % too small
+# Elements of the mesh for model errors; with 3000, the errors of shaped touches are 15 % too small.
 ERROR_ELEMENTS = 6000
 
 
 @dataclass(frozen=True)
 class BuildSettings:
-    """What a model is built with; ``rank`` 0 takes as many as there are folded rows, at most 64;
-    ``samples`` random skins are drawn for the model's errors, 0 for none, None for as many as the
-    skin's uncertainty says."""
+    """The settings for building a model. ``rank`` 0 takes the number of folded rows, at most 64.
+    ``samples`` is the number of random skins that are drawn for the model errors: 0 draws none, and
+    None takes the number from the skin's uncertainty."""
 
     rank: int = 0
     pixels_across: int = 32
@@ -64,9 +64,11 @@ class BuildSettings:
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """The skin's linear answer: ``jacobian`` (m, n) V per S/m on ``grid``, ``v0_v`` (m,), and the
-    mesh's element count; ``electrode_fields`` (n, 2, L) V/m per A for what touches do to each
-    other, None to build a model without.
+    """The linear response of a skin: ``jacobian`` (m, n) in V per S/m on ``grid``, ``v0_v`` (m,),
+    and the number of elements of the mesh.
+
+    ``electrode_fields`` (n, 2, L) in V/m per A serve to calculate the interaction of touches; with
+    None the model is built without it.
     """
 
     grid: Grid
@@ -79,7 +81,11 @@ class Linearisation:
 def linearise(
     skin: Skin, protocol: Protocol, *, pixels_across: int = 32, elements: int = 3000
 ) -> Linearisation:
-    """Mesh ``skin`` and take the Jacobian of its boundary voltages at its own conductivity."""
+    """Mesh ``skin`` and calculate the Jacobian of its boundary voltages at its own conductivity.
+
+    Raises:
+        GeometryError, UsageError, MissingExtraError: as ``mesh_for_elements``.
+    """
     from eitskin.fem.cem import ForwardModel
     from eitskin.fem.fields import electrode_fields
     from eitskin.fem.mesh import mesh_for_elements
@@ -96,14 +102,14 @@ def linearise(
 def make_model(
     skin: Skin, protocol: Protocol, linear: Linearisation, settings: BuildSettings
 ) -> Model:
-    """Reduce and store a linearisation; the golden image comes from the float32 C core."""
+    """Reduce and store a linearisation. The golden image is calculated by the float32 C core."""
     _refuse_settings(settings, linear.grid)
     fold = protocol.reciprocal_pairs()
     v_ref, jacobian = fold_rows(linear.v0_v, fold), fold_rows(linear.jacobian, fold)
     silent = np.zeros(len(v_ref), dtype=np.bool_)
     if settings.data_kind == "normalised":
-        # a row whose reference is all but zero says nothing as a ratio; the solver leaves it out as
-        # well
+        # A ratio to a reference of almost zero carries no information; the solver ignores this row,
+        # too.
         silent = np.abs(v_ref) < MIN_RATIO_REFERENCE * np.sqrt(np.mean(v_ref**2))
         jacobian = np.where(silent[:, None], 0.0, jacobian / np.where(silent, 1.0, v_ref)[:, None])
     rank = settings.rank or min(64, *jacobian.shape)
@@ -140,7 +146,7 @@ def make_model(
 
 
 def _refuse_settings(settings: BuildSettings, grid: Grid) -> None:
-    """Refuse what no .eitm file can hold, before the work."""
+    """Reject settings that no .eitm file can hold, before any work is done."""
     if settings.storage not in STORAGES or settings.data_kind not in DATA_KINDS:
         raise UsageError(
             f"model: storage must be one of {', '.join(STORAGES)}; data one of"
@@ -149,19 +155,20 @@ def _refuse_settings(settings: BuildSettings, grid: Grid) -> None:
     if not 0 <= settings.rank <= MAX_RANK:
         raise UsageError(
             f"model: rank = {settings.rank} is out of range; use 1 to {MAX_RANK}, or 0 for the"
-            " usual one"
+            " default"
         )
     if grid.n_pixels > MAX_PIXELS:
         raise UsageError(
-            f"model: {grid.n_pixels} pixels are more than a model's {MAX_PIXELS}; use fewer across"
+            f"model: {grid.n_pixels} pixels are more than a model's {MAX_PIXELS}; use fewer pixels"
+            " across"
         )
 
 
 def scaled_defaults(
     skin: Skin, data_kind: str, touch_change_ratio: float = TOUCH_CHANGE_RATIO
 ) -> Defaults:
-    """Defaults for ``skin``: lengths in proportion to its size, the expected change to its
-    conductivity."""
+    """Return the defaults for ``skin``: lengths in proportion to its size, and the expected change
+    in proportion to its conductivity."""
     paper = Defaults()
     scale = size_to_paper(skin.outline)
     return replace(
@@ -189,9 +196,12 @@ def build_model(
     progress: Progress = silent,
     jacobian: FloatArray | None = None,
 ) -> Model:
-    """The whole way from ``skin`` to a model, with the model errors that its uncertainty asks for;
-    ``progress`` and errors as ``linearise``, ``make_model`` and ``with_model_errors``. ``jacobian``
-    (m, n) V per S/m on the settings' grid stands in place of our own."""
+    """Build the model of ``skin`` with all steps, including the model errors that its uncertainty
+    asks for.
+
+    ``progress`` and errors are as for ``linearise``, ``make_model`` and ``with_model_errors``.
+    ``jacobian`` (m, n) in V per S/m on the settings' grid, if given, replaces the calculated one.
+    """
     chosen = settings or BuildSettings()
     asked = skin.uncertainty
     if chosen.samples == 0:
@@ -216,10 +226,11 @@ def with_model_errors(
     *,
     progress: Progress = silent,
 ) -> Model:
-    """``model`` of ``skin`` with the errors that ``uncertainty`` makes, drawn on a mesh of twice
-    ``elements``, at most 6000.
+    """Return ``model`` of ``skin`` with the model errors that follow from ``uncertainty``. They are
+    drawn on a mesh of twice ``elements``, at most 6000.
 
-    ``progress`` wraps the samples as they are done, and is told how many there are."""
+    ``progress`` wraps the samples as they are done, and is given their number.
+    """
     from eitskin.fem.mesh import mesh_for_elements
     from eitskin.model.monte_carlo import draw_model_errors
     from eitskin.model.random_skins import Request
@@ -238,8 +249,8 @@ def with_model_errors(
 
 
 def stored_fields(skin: Skin, protocol: Protocol, linear: Linearisation) -> Fields | None:
-    """The fields of ``linear`` as a model stores them, the greatest as 1024; None where there are
-    none."""
+    """Return the fields of ``linear`` in the form that a model stores, scaled so that the greatest
+    is 1024; None if there are none."""
     if linear.electrode_fields is None:
         return None
     fields = linear.electrode_fields.reshape(linear.grid.n_pixels, -1)
@@ -254,8 +265,8 @@ def stored_fields(skin: Skin, protocol: Protocol, linear: Linearisation) -> Fiel
 
 
 def _golden_frame(skin: Skin, linear: Linearisation) -> npt.NDArray[np.float32]:
-    """Two discs, as the linear model sees them: reproducible from the model's own Jacobian, with no
-    random number."""
+    """Return the frame of two discs as the linear model predicts it. It can be reproduced from the
+    model's own Jacobian, without random numbers."""
     centres = linear.grid.centres_mm()
     middle, size = centres.mean(axis=0), np.ptp(centres, axis=0).min()
     change = np.zeros(len(centres))

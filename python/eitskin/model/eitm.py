@@ -1,6 +1,6 @@
-"""The .eitm file, byte by byte as docs/reference/eitm-format.md specifies: header, checksum and
-table of sections; ``eitm_sections`` has what stands in them. This reader is independent of the C
-one."""
+"""Read and write .eitm files as docs/reference/eitm-format.md specifies them, byte by byte: header,
+checksum and table of sections. ``eitm_sections`` handles the contents of the sections. This reader
+is independent of the C reader."""
 
 import struct
 import zlib
@@ -25,7 +25,7 @@ MAX_SECTIONS = 256
 
 
 def encode_model(model: Model, sums: bytes = b"") -> bytes:
-    """The file's bytes, with ``sums`` as the section SUMS."""
+    """Return the bytes of the file, with ``sums`` as the section SUMS unless empty."""
     sections = encode_sections(model)
     if sums:
         sections["SUMS"] = sums
@@ -55,7 +55,11 @@ def _assemble(sections: Sections, protocol_hash: int, taught: bool) -> bytes:
 
 
 def decode_model(blob: bytes, where: str) -> Model:
-    """The model in ``blob``; ``where`` names it in errors."""
+    """Return the model in ``blob``; ``where`` names it in errors.
+
+    Raises:
+        ModelError: it is truncated, corrupted, newer, or not a model.
+    """
     sections = _split(blob, where)
     try:
         return decode_sections(sections, _header(blob, where)[7], where)
@@ -85,8 +89,7 @@ def _split(blob: bytes, where: str) -> Sections:
         )
     if total < HEADER.size or total % 16:
         raise ModelError(
-            f"{where}: the header states a size of {total} bytes, as no model has; build the model"
-            " again"
+            f"{where}: the header states an impossible size of {total} bytes; build the model again"
         )
     if len(blob) < total:
         raise ModelError(
@@ -123,26 +126,28 @@ def _split(blob: bytes, where: str) -> Sections:
 
 
 def load_model(path: str | Path) -> tuple[Model, bytes]:
-    """The model in the file ``path``, decoded, and its bytes for the C core.
+    """Read the file ``path``; return the decoded model, and the file's bytes for the C core.
 
     Raises:
-        FileError: it cannot be read.
-        ModelError: it is truncated, corrupted, newer or foreign.
+        FileError: the file cannot be read.
+        ModelError: it is truncated, corrupted, newer, or not a model.
     """
     blob = read_bytes(path, "model")
     return decode_model(blob, str(path)), blob
 
 
 def encode_tested(model: Model) -> bytes:
-    """The file's bytes, with checksums of what the float32 core makes of the golden frames."""
+    """Return the bytes of the file, with checksums of the results that the float32 core calculates
+    for the golden frames."""
     return encode_model(model, CoreEngine(encode_model(model), "float32").self_test_sums())
 
 
 def save_model(path: str | Path, model: Model) -> int:
-    """Write ``model`` to ``path`` whole or not at all; returns the number of bytes.
+    """Write ``model`` to ``path`` completely or not at all; return the number of bytes.
 
     Raises:
-        FileError: it cannot be written. Else as :func:`encode_tested`.
+        FileError: the file cannot be written.
+        ModelError, FrameError: as :func:`encode_tested`.
     """
     content = encode_tested(model)
     write_bytes(path, content)

@@ -1,5 +1,5 @@
-"""What stands in the sections of an .eitm file (docs/reference/eitm-format.md), there and back,
-with every length, index and number checked."""
+"""Encode and decode the sections of an .eitm file (docs/reference/eitm-format.md); every length,
+index and number is checked."""
 
 import json
 import struct
@@ -50,7 +50,11 @@ Sections = dict[str, bytes]
 
 
 def encode_sections(model: Model) -> Sections:
-    """What the sections of ``model`` hold, by tag, but for SUMS."""
+    """Return the contents of each section of ``model`` by tag, without SUMS.
+
+    Raises:
+        ModelError: a number does not fit float32.
+    """
     _check_floats(model)
     stored, stride = model.stored, stride_for(model.rank)
     projection = np.zeros((model.projection.shape[1], stride), dtype="<f4")
@@ -116,7 +120,7 @@ def _fields_stride(n_electrodes: int) -> int:
 
 
 def _check_floats(model: Model) -> None:
-    """Refuse what float32 cannot hold, and what no reader would take."""
+    """Reject numbers that float32 cannot hold or that no reader would accept."""
     numbers = {
         "the Lipschitz constant": model.lipschitz, "the noise gain": model.noise_gain,
         "the current": model.protocol.current_a,
@@ -143,7 +147,7 @@ def _encode_dims(model: Model, stride: int) -> bytes:
 
 @dataclass(frozen=True)
 class _Dims:
-    """Section DIMS, field by field."""
+    """The fields of section DIMS."""
 
     n_electrodes: int
     n_rows: int
@@ -195,7 +199,7 @@ def _read_dims(content: bytes, where: str) -> _Dims:
 
 def _check_sizes(sections: Sections, d: _Dims, where: str) -> None:
     item = DTYPES[STORAGES[d.storage]].itemsize
-    wanted = {
+    sizes = {
         "PROT": 4 * d.n_rows,
         "FOLD": FOLD_DTYPE.itemsize * d.n_folded,
         "VREF": 4 * d.n_folded,
@@ -207,12 +211,12 @@ def _check_sizes(sections: Sections, d: _Dims, where: str) -> None:
         "DEFS": DEFAULTS.size,
         "GOLD": 4 * (2 * d.n_rows + d.n_pixels),
     }
-    for name, size in wanted.items():
+    for name, size in sizes.items():
         given = len(sections[name]) if name in sections else None
         if given != size:
             _refuse(
                 where,
-                f"section {name!r} of {given or 'no'} bytes where its dimensions ask for"
+                f"section {name!r} of {given or 'no'} bytes where its dimensions need"
                 f" {size or 'none'}",
             )
 
@@ -245,7 +249,8 @@ def _read_grid(content: bytes, d: _Dims, where: str) -> Grid:
 
 
 def _solver_of(number: int, where: str) -> str:
-    """The name of a solver's number; files of format 1.0 have 0 there, FISTA."""
+    """Return the name of a solver by its number; files of format 1.0 have 0 here, which is
+    FISTA."""
     if number == REMOVED_SOLVER:
         _refuse(where, "the solver coordinate descent, which eitskin no longer has")
     names = {value: name for name, value in CHOICES["solver"].items()}
@@ -285,9 +290,7 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
 def _read_fields(content: bytes, d: _Dims, where: str) -> Fields:
     stride = _fields_stride(d.n_electrodes)
     if len(content) != FIELDS_HEAD.size + 2 * stride * d.n_pixels:
-        _refuse(
-            where, f"section 'FLDS' of {len(content)} bytes where its dimensions ask for others"
-        )
+        _refuse(where, f"section 'FLDS' of {len(content)} bytes, which does not fit its dimensions")
     volts, per_sheet = FIELDS_HEAD.unpack_from(content)
     columns = np.frombuffer(content, dtype="<f2", offset=FIELDS_HEAD.size).reshape(
         d.n_pixels, stride
@@ -302,7 +305,7 @@ def _read_precision(sections: Sections, d: _Dims, where: str) -> npt.NDArray[np.
         return None
     count = d.n_folded * (d.n_folded + 1) // 2
     if len(sections["PREC"]) != 4 * count:
-        _refuse(where, "section 'PREC' of a size that its rows do not ask for")
+        _refuse(where, "section 'PREC' of a size that does not fit its rows")
     values = _floats(sections, "PREC", (count,), where)
     diagonal = np.cumsum(np.arange(1, d.n_folded + 1)) - 1
     if "WHIT" in sections or not (values[diagonal] >= 0).all() or np.abs(values).max() > HUGE:
@@ -314,7 +317,7 @@ def _read_place_factor(sections: Sections, where: str) -> float:
     if "PLAC" not in sections:
         return 0.0
     if len(sections["PLAC"]) != 4:
-        _refuse(where, "section 'PLAC' that is no number")
+        _refuse(where, "section 'PLAC' that is not one number")
     factor = float(_floats(sections, "PLAC", (1,), where)[0])
     if not 0 <= factor <= HUGE:
         _refuse(where, "a number in section 'PLAC' that is out of range")
@@ -322,11 +325,11 @@ def _read_place_factor(sections: Sections, where: str) -> float:
 
 
 def _read_order(sections: Sections, table: npt.NDArray[np.uint8], where: str) -> tuple[int, ...]:
-    """The order of drives; () as they stand."""
+    """Return the order of the drives, or () if they are measured as listed."""
     if "ORDR" not in sections:
         return ()
     if len(sections["ORDR"]) != 4 * len(table):
-        _refuse(where, "section 'ORDR' of a size that its rows do not ask for")
+        _refuse(where, "section 'ORDR' of a size that does not fit its rows")
     rows, places = np.frombuffer(sections["ORDR"], dtype="<u2").reshape(2, -1).astype(np.int64)
     starts = np.flatnonzero(np.r_[True, (table[1:, :2] != table[:-1, :2]).any(axis=1)])
     drives = np.searchsorted(starts, rows[np.isin(rows, starts)])
@@ -346,12 +349,12 @@ def _read_meta(content: bytes, where: str) -> dict[str, Any]:
         _refuse(where, "section 'META' that is not JSON")
     skin = meta.get("skin", {}) if isinstance(meta, dict) else None
     if not isinstance(skin, dict) or not isinstance(skin.get("skin", {}), dict):
-        _refuse(where, "section 'META' that is no description of a model")
+        _refuse(where, "section 'META' that does not describe a model")
     return dict(meta)
 
 
 def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model:
-    """The model of these sections; ``where`` names it in errors."""
+    """Return the model that these sections hold; ``where`` names it in errors."""
     d = _read_dims(sections["DIMS"], where)
     _check_sizes(sections, d, where)
     table = np.frombuffer(sections["PROT"], dtype="u1").reshape(d.n_rows, 4)
@@ -361,7 +364,7 @@ def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model
     if protocol.hash != protocol_hash:
         _refuse(where, "a protocol table that does not fit its hash")
     if len(sections.get("SUMS", b"    ")) not in range(4, 2**32, 4):
-        _refuse(where, "section 'SUMS' of a size that checksums do not have")
+        _refuse(where, "section 'SUMS' of a size that is not that of checksums")
     name = STORAGES[d.storage]
     columns = np.frombuffer(sections["SENS"], dtype=DTYPES[name]).reshape(d.n_pixels, d.stride)
     if not np.isfinite(columns).all():
@@ -399,13 +402,14 @@ def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model
 
 
 def _read_model_errors(sections: Sections, d: _Dims, where: str) -> ModelErrors:
-    """What GEOM alone says (format 1.9) is of use to no reader any more."""
+    """Read the model errors. GEOM without MOVE (format 1.9) is ignored: no reader uses it any
+    more."""
     both = "GEOM" in sections and "MOVE" in sections
     places = decode_places(sections["GEOM"], sections["MOVE"], d.n_folded, where) if both else None
     return decode_model_errors(sections["UNCE"], d.rank, where, places)
 
 
 def _short(value: float) -> float:
-    """A float32 as the shortest decimal that gives it again, so that 0.03 is read as 0.03; whole
-    numbers stay."""
+    """Return a float32 as the shortest decimal that converts back to it, so that 0.03 is read as
+    0.03. Integers stay as they are."""
     return value if isinstance(value, int) else float(str(np.float32(value)))

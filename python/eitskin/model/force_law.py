@@ -1,5 +1,5 @@
-"""How a touch's strength and place tell its load: the optional section LOAD of a model
-(docs/guide/calibration.md), read and used."""
+"""The law that gives the force of a touch from its strength and place: reading and using the
+optional section LOAD of a model (docs/guide/calibration.md)."""
 
 import struct
 from dataclasses import dataclass
@@ -17,22 +17,25 @@ MIN_RADIUS_MM, HUGE, MAX_REACH, MAX_COEFFICIENT = 1e-6, 1e30, 1e3, 1e6
 
 
 def terms_of(order: int) -> list[tuple[int, int]]:
-    """Powers (a, b) of u and v in the order of the coefficients: 1, u, v, u^2, u v, v^2..."""
+    """Return the powers (a, b) of u and v in the order of the coefficients: 1, u, v, u^2, u v,
+    v^2..."""
     return [(degree - b, b) for degree in range(order + 1) for b in range(degree + 1)]
 
 
 def monomials(u: FloatArray, v: FloatArray, order: int) -> FloatArray:
-    """(k, t) numbers: each of :func:`terms_of` at (u, v), both (k,)."""
+    """Return the value of each of :func:`terms_of` at (u, v), both (k,): (k, t)."""
     return np.stack([u**a * v**b for a, b in terms_of(order)], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class LoadLaw:
-    """A calibration. ``strength`` (p,) S/m mm^2 and ``force_n`` (p,) N both ascend from 0: the
-    table where the gain is 1. ``gain`` (t,) are coefficients of :func:`terms_of` (``order``) in u =
-    x / ``radius_mm``, v = y / ``radius_mm``, trusted to ``reach`` = sqrt(u^2 + v^2);
-    ``uncertainty`` is relative: 95 % of the loads that were left out of the fit were within it.
-    float32 all.
+    """A calibrated law.
+
+    ``strength`` (p,) in S/m mm^2 and ``force_n`` (p,) in N are the table for a gain of 1; both
+    ascend from 0. ``gain`` (t,) holds the coefficients of :func:`terms_of` (``order``) in u = x /
+    ``radius_mm``, v = y / ``radius_mm``; it is valid up to ``reach`` = sqrt(u^2 + v^2).
+    ``uncertainty`` is relative: 95 % of the forces that were left out of the fit were predicted
+    within it. All values are float32.
     """
 
     strength: npt.NDArray[np.float32]
@@ -44,8 +47,8 @@ class LoadLaw:
     uncertainty: float
 
     def gains_at(self, place_mm: FloatArray) -> FloatArray:
-        """What strengths at places (k, 2) are multiplied by: the polynomial, within 1/4 to 4;
-        beyond ``reach`` as there."""
+        """Return the factor for strengths at places (k, 2): the polynomial, limited to 1/4 to 4.
+        Beyond ``reach`` it keeps the value that it has at ``reach`` in the same direction."""
         u, v = np.asarray(place_mm).T / self.radius_mm
         away = np.hypot(u, v)
         inward = np.where(away > self.reach, self.reach / np.maximum(away, 1e-300), 1.0)
@@ -53,15 +56,15 @@ class LoadLaw:
         return np.asarray(np.clip(value, 1 / MAX_GAIN, MAX_GAIN))
 
     def forces_at(self, place_mm: FloatArray, strength: FloatArray) -> FloatArray:
-        """Loads (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2); beyond the
-        table by its last slope, to twice its greatest load. What eits_force_n in
-        csrc/src/model/force.c gives."""
-        seen = np.abs(strength) * self.gains_at(place_mm)
+        """Return the forces (k,) in N of touches of ``strength`` (k,) S/m mm^2 at places (k, 2).
+        Beyond the table its last slope continues, up to twice its greatest force. The result is
+        that of eits_force_n in csrc/src/model/force.c."""
+        corrected = np.abs(strength) * self.gains_at(place_mm)
         s, n = self.strength.astype(np.float64), self.force_n.astype(np.float64)
-        k = np.clip(np.searchsorted(s, seen), 1, len(s) - 1)
+        k = np.clip(np.searchsorted(s, corrected), 1, len(s) - 1)
         return np.asarray(
             np.minimum(
-                n[k - 1] + (seen - s[k - 1]) / (s[k] - s[k - 1]) * (n[k] - n[k - 1]), 2 * n[-1]
+                n[k - 1] + (corrected - s[k - 1]) / (s[k] - s[k - 1]) * (n[k] - n[k - 1]), 2 * n[-1]
             )
         )
 
@@ -76,7 +79,11 @@ def encode_load(law: LoadLaw) -> bytes:
 
 
 def decode_load(content: bytes, where: str) -> LoadLaw:
-    """The section LOAD; ``where`` names its file in errors."""
+    """Return the law in the section LOAD; ``where`` names the file in errors.
+
+    Raises:
+        ModelError: a length or a number is out of range.
+    """
     wrong = ModelError(
         f"{where}: holds a calibration (section 'LOAD') that is out of range; calibrate again"
     )

@@ -1,4 +1,5 @@
-"""The stored model as Python sees it: everything from a frame's rows to the image's pixels."""
+"""The stored model as a Python object, with everything that maps the rows of a frame to the pixels
+of an image."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,18 +18,19 @@ from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.skin.skin import Skin, skin_from_table
 
 DATA_KINDS = ("difference", "normalised", "log-ratio")
-GAIN_DRIFT_KEPT = 8  # of touch_fit_left_out: changes along the reference are data like others
-TRACKS_REFERENCE = 16  # likewise: between touches the reference follows the skin
+GAIN_DRIFT_KEPT = 8  # a bit of touch_fit_left_out: changes along the reference are kept as data
+TRACKS_REFERENCE = 16  # another: between touches the reference tracks the untouched skin
 
 
 @dataclass(frozen=True)
 class Defaults:
-    """What the model's maker chose, in the file's order; csrc/include/eitskin/context.h says what
-    each does.
+    """The default options that the maker of a model chose, in the order of the file;
+    csrc/include/eitskin/context.h explains each.
 
-    Lambdas, gate and thresholds are factors without unit; ``mask_threshold`` is t of the mask x > t
-    max(x); ``solver`` is one of ``core.results.SOLVERS``; ``touch_fit_left_out``: bits of
-    ``Options.touch_fit`` that are not set, ``GAIN_DRIFT_KEPT`` and ``TRACKS_REFERENCE``.
+    Lambdas, the detection threshold and the other thresholds are factors without unit.
+    ``mask_threshold`` is t of the mask x > t max(x). ``solver`` is one of ``core.results.SOLVERS``.
+    ``touch_fit_left_out`` holds the bits of ``Options.touch_fit`` that are not set, and
+    ``GAIN_DRIFT_KEPT`` and ``TRACKS_REFERENCE``.
     """
 
     iterations: int = 60
@@ -51,8 +53,8 @@ class Defaults:
 
 @dataclass(frozen=True, eq=False)
 class Golden:
-    """The self-test: ``reference_v`` and ``frame_v`` (m,), and the float32 core's ``image`` (n,)
-    S/m, all float32."""
+    """The data of the self-test: ``reference_v`` and ``frame_v`` (m,), and the ``image`` (n,) in
+    S/m that the float32 core calculates; all float32."""
 
     reference_v: npt.NDArray[np.float32]
     frame_v: npt.NDArray[np.float32]
@@ -61,10 +63,13 @@ class Golden:
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """For what touches do to each other (section FLDS). ``columns`` (n, 2 L + 4) float16: of each
-    pixel E_x of each electrode's current, E_y of each, then a_x, a_y, b_x, b_y of the rim's mirror
-    (``fem.fields``); ``volts``: dV = -volts change area E . E in V per (S/m mm2); ``per_sheet``: 1
-    / (2 pi sigma), m/S; both float32."""
+    """The data for the interaction of touches (section FLDS).
+
+    ``columns`` (n, 2 L + 4) float16 hold for each pixel E_x of each electrode's current, then E_y
+    of each, then a_x, a_y, b_x, b_y of the rim's mirror (``skin.mirror``). ``volts`` is the factor
+    in dV = -volts change area E . E, in V per (S/m mm2); ``per_sheet`` is 1 / (2 pi sigma) in m/S.
+    Both are float32.
+    """
 
     columns: npt.NDArray[np.float16]
     volts: float
@@ -73,13 +78,17 @@ class Fields:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A model, decoded. ``v_ref_v`` (k,) folded voltages of the untouched skin; ``projection`` P
-    (r, k) float32; ``stored`` S; ``column_weight`` (n,) float32, S/m per coefficient; ``meta`` how
-    it was made; ``fields`` where it has them; ``load`` tells loads from strengths, where the skin
-    was calibrated; ``model_errors`` how far a real skin may be from it, where that was drawn;
-    ``precision`` (k (k + 1) / 2,) of a taught model, the lower triangle of the inverse covariance
-    of the rows' noise; ``place_factor`` what the covariance of a place by the fit is multiplied by,
-    0 where that is not known.
+    """A decoded model.
+
+    ``v_ref_v`` (k,) are the folded voltages of the untouched skin, ``projection`` is P (r, k)
+    float32, ``stored`` is S, ``column_weight`` (n,) float32 is in S/m per coefficient, and ``meta``
+    describes how the model was made.
+
+    The other fields are optional. ``fields`` serve the interaction of touches. ``load`` converts
+    strengths to forces if the skin was calibrated. ``model_errors`` state how far a real skin may
+    differ from the model. ``precision`` (k (k + 1) / 2,) belongs to taught models: the lower
+    triangle of the inverse covariance of the rows' noise. ``place_factor`` multiplies the
+    covariance of a place from the fit; 0 means unknown.
     """
 
     protocol: Protocol
@@ -110,7 +119,7 @@ class Model:
 
     @cached_property
     def sensitivity(self) -> FloatArray:
-        """S (r, n) as stored, decoded."""
+        """The decoded S (r, n)."""
         return self.stored.decode(self.rank)
 
     @cached_property
@@ -118,6 +127,6 @@ class Model:
         """The skin that the model was made for.
 
         Raises:
-            ConfigError: the model carries no description of it.
+        ConfigError: the model has no description of its skin.
         """
         return skin_from_table(self.meta.get("skin", {}), "the model's own description")

@@ -1,5 +1,5 @@
-"""What a real skin's data may differ by from the model's: the sections UNCE, GEOM and MOVE of a
-.eitm file."""
+"""Bounds for the differences between the data of a real skin and the model: the sections UNCE, GEOM
+and MOVE of a .eitm file."""
 
 import struct
 from dataclasses import dataclass
@@ -15,18 +15,22 @@ Float32s = npt.NDArray[np.float32]
 HEAD = struct.Struct("<I3f")
 MOVE_HEAD = struct.Struct("<III4x")
 MAX_ROWS, MAX_MM = 32, 1e6
-MOVE_TERMS = (1, 3, 6, 10, 15)  # of polynomials in two coordinates up to the fourth degree
+MOVE_TERMS = (1, 3, 6, 10, 15)  # terms of a polynomial in two coordinates, of degree 0 to 4
 ROW_GAINS = 1
 HUGE = 1e30
-NEGATIVE = 1e-5  # an eigenvalue below 0 by this part of the greatest is rounding
+NEGATIVE = 1e-5  # a negative eigenvalue up to this part of the greatest counts as rounding
 
 
 @dataclass(frozen=True, eq=False)
 class TarePlaces:
-    """What a tare tells of places, by y = log(v0 / v_ref) over the k folds: ``left`` N (p, k), mm,
-    |N y|^2 is what the variance of a place grows by; ``seen`` M (q, k) and ``moves`` U (2, t, q),
-    mm: along x and y a touch is found off by the polynomial with coefficients U M y; ``rest`` (r,
-    k) directions of y that no skin has, whatever its electrodes, outline and sheet."""
+    """The information of a tare about errors of places, from y = log(v0 / v_ref) over the k folded
+    rows (``tare_places`` has the theory).
+
+    ``left`` is N (p, k) in mm: |N y|^2 is added to the variance of a place. ``seen`` is M (q, k)
+    and ``moves`` is U (2, t, q) in mm: a touch is found displaced along x and y by the polynomial
+    with the coefficients U M y. ``rest`` (r, k) are directions of y that no change of electrodes,
+    outline and skin conductivity can cause.
+    """
 
     left: Float32s
     seen: Float32s
@@ -34,7 +38,7 @@ class TarePlaces:
     rest: Float32s
 
     def encode(self) -> dict[str, bytes]:
-        """The sections GEOM and MOVE, rows fold by fold."""
+        """Return the sections GEOM and MOVE, with rows ordered by fold."""
         left, seen, moves, rest = (
             np.ascontiguousarray(part).astype("<f4").tobytes()
             for part in (self.left.T, self.seen.T, self.moves, self.rest.T)
@@ -47,11 +51,12 @@ class TarePlaces:
 class ModelErrors:
     """Second moments of the data's errors, reduced by P.
 
-    ``error`` P E P' (r, r): of errors relative to the data's norm |d|; ``drift`` P D P' (r, r): of
-    what the skin's own drift adds, in the datum's unit squared; both float32, symmetric and
-    positive semidefinite. ``rms_error`` and ``rms_shape_error``: sqrt(mean |e|^2) of random skins
-    and of shaped touches, all rows. ``row_gains``: each row is to be scaled to the model by the
-    tare. ``places``: what that tells of places; None: not known.
+    ``error`` is P E P' (r, r), with E for errors relative to the norm |d| of the data. ``drift`` is
+    P D P' (r, r), with D for what the drift of the skin itself adds, in squared units of the data.
+    Both are float32, symmetric and positive semidefinite. ``rms_error`` and ``rms_shape_error`` are
+    sqrt(mean |e|^2) for random skins and for shaped touches over all rows. ``row_gains`` tells that
+    each row is to be scaled to the model by the tare. ``places`` states what the tare reveals about
+    places; None means unknown.
     """
 
     error: Float32s
@@ -62,7 +67,7 @@ class ModelErrors:
     places: TarePlaces | None = None
 
     def encode(self) -> bytes:
-        """The section's bytes."""
+        """Return the bytes of section UNCE."""
         head = HEAD.pack(
             ROW_GAINS if self.row_gains else 0, self.rms_error, self.rms_shape_error, 0.0
         )
@@ -78,12 +83,12 @@ def decode_model_errors(
     where: str,
     places: TarePlaces | None = None,
 ) -> ModelErrors:
-    """The section's numbers, of a model of ``rank``; ``places`` are those of the sections
-    GEOM and MOVE.
+    """Return the model errors in section UNCE for a model of ``rank``; ``places`` are those of the
+    sections GEOM and MOVE.
 
     Raises:
-        ModelError: it has another length than the rank asks for, a number is out of range, or a
-            matrix is not positive semidefinite.
+        ModelError: the length does not fit the rank, a number is out of range, or a matrix is not
+            positive semidefinite.
     """
     count = rank * (rank + 1) // 2
     if len(content) != HEAD.size + 8 * count:
@@ -103,8 +108,8 @@ def decode_model_errors(
         eigenvalues = np.linalg.eigvalsh(matrix.astype(np.float64))
         if eigenvalues[0] < -NEGATIVE * max(eigenvalues[-1], 0.0):
             raise ModelError(
-                f"{where}: holds a matrix in section 'UNCE' that is no covariance; build the model"
-                " again"
+                f"{where}: holds a matrix in section 'UNCE' that is not a covariance; build the"
+                " model again"
             )
     return ModelErrors(
         error,
@@ -117,10 +122,10 @@ def decode_model_errors(
 
 
 def decode_places(geom: bytes, move: bytes, folds: int, where: str) -> TarePlaces:
-    """The numbers of both sections, of a model of ``folds``.
+    """Return the content of the sections GEOM and MOVE for a model with ``folds`` folded rows.
 
     Raises:
-        ModelError: one has another length than its counts ask for, or a number is out of range.
+        ModelError: a length does not fit the counts, or a number is out of range.
     """
     rows, over = divmod(len(geom), 4 * folds)
     if over or not 1 <= rows <= MAX_ROWS:
@@ -153,14 +158,14 @@ def decode_places(geom: bytes, move: bytes, folds: int, where: str) -> TarePlace
 
 def _other_size(where: str, name: str) -> str:
     return (
-        f"{where}: holds section {name!r} of a size that its rows do not ask for; build the model"
+        f"{where}: holds section {name!r} of a size that does not fit its rows; build the model"
         " again"
     )
 
 
 def as_covariance(matrix: FloatArray) -> Float32s:
-    """``matrix`` (r, r) made symmetric, and positive semidefinite in float32: eigenvalues are
-    raised to what rounding needs."""
+    """Return ``matrix`` (r, r) made symmetric, and positive semidefinite in float32: eigenvalues
+    are raised as far as rounding requires."""
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
     least = 1e-6 * max(values[-1], 0.0)
     while True:

@@ -1,8 +1,9 @@
-"""Random skins (model.random_skins) drawn on every core: the model errors of a model.
+"""Draw random skins (model.random_skins) on every processor core, and calculate the model errors
+from them.
 
-Each process is this module run by itself, so that any script may build a model, guarded or not.
-They use one thread each, and samples are summed in their order: the number of processes changes no
-bit.
+Each process runs this module itself, so any script can build a model, with or without a
+``__main__`` guard. A process uses one thread, and samples are summed in their order, so the number
+of processes does not change a bit of the result.
 """
 
 import os
@@ -37,17 +38,21 @@ THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 def draw_model_errors(
     request: Request, *, jobs: int | None = None, progress: Progress = silent
 ) -> ModelErrors:
-    """The model errors of ``request``, drawn by ``jobs`` processes (None: one a core).
+    """Return the model errors of ``request``, drawn by ``jobs`` processes (None: one per core).
 
-    ``progress`` wraps the samples as they are done, and is told how many there are."""
+    ``progress`` wraps the samples as they are done, and is given their number.
+
+    Raises:
+        ModelError: a process failed.
+    """
     samples = request.uncertainty.samples
     count = max(1, min(jobs or os.cpu_count() or 1, samples))
     idle: SimpleQueue[_Process] = SimpleQueue()
 
-    def ask(*what: Any) -> Any:
+    def ask(name: str, *arguments: Any) -> Any:
         process = idle.get()
         try:
-            return process.ask(*what)
+            return process.ask(name, *arguments)
         finally:
             idle.put(process)
 
@@ -78,7 +83,7 @@ def draw_model_errors(
 
 
 class _Process:
-    """A process that calls the methods of a :class:`RandomSkins` of its own."""
+    """A process that calls the methods of its own :class:`RandomSkins`."""
 
     def __init__(self, request: Request) -> None:
         root = str(Path(eitskin.__file__).parents[1])
@@ -93,13 +98,13 @@ class _Process:
         self._send(request)
 
     def ask(self, name: str, *arguments: Any) -> Any:
-        """What METHODS' ``name`` says to ``arguments``."""
+        """Return the result of METHODS[``name``] for ``arguments``."""
         self._send((name, arguments))
         assert self._process.stdout is not None
         try:
             answer = pickle.load(self._process.stdout)
         except (OSError, EOFError, pickle.UnpicklingError):
-            raise _failed("it ended before its time") from None
+            raise _failed("it ended early") from None
         if isinstance(answer, str):
             raise _failed(answer)
         return answer
@@ -115,7 +120,7 @@ class _Process:
             pickle.dump(what, self._process.stdin)
             self._process.stdin.flush()
         except OSError:
-            raise _failed("it ended before its time") from None
+            raise _failed("it ended early") from None
 
 
 def _failed(why: str) -> ModelError:
@@ -126,7 +131,7 @@ def _failed(why: str) -> ModelError:
 
 
 def main(asked: IO[bytes], answers: IO[bytes]) -> None:
-    """Answer what is asked until it ends; a text is an error."""
+    """Answer requests from ``asked`` until it ends. An answer that is a text reports an error."""
     request = pickle.load(asked)
     skins: RandomSkins | None = None
     while True:

@@ -1,4 +1,4 @@
-"""A model's own defaults as options, and what suits a stream."""
+"""The options of the core that a model's own defaults give, and those for a stream."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ from eitskin.model.model import GAIN_DRIFT_KEPT, TRACKS_REFERENCE, Model
 
 
 def default_options(model: Model) -> Options:
-    """The model's own defaults."""
+    """Return the options that the model's own defaults give."""
     d = model.defaults
     return Options(
         **{name: getattr(d, name) for name in OF_MODEL},
@@ -33,9 +33,9 @@ def default_options(model: Model) -> Options:
 
 
 def tracking(options: Options) -> Options:
-    """``options``, of :func:`default_options`, for frames that follow one another: as
-    eits_options_track in the C core sets them, to the bit in float32. docs/guide/tracking.md says
-    what that is worth."""
+    """Return ``options``, from :func:`default_options`, for consecutive frames. The result equals
+    that of eits_options_track in the C core, bit by bit in float32. docs/guide/tracking.md shows
+    the gain."""
     detection_factor = float(np.float32(options.detection_factor) * np.float32(TRACK_DETECTION))
     return replace(
         options,

@@ -1,8 +1,8 @@
 """The prebuilt model of the paper's skin that ships with the package, so that reconstruction needs
 neither scipy nor netgen.
 
-Made by ``eitskin model build --paper -o python/eitskin/model/paper.eitm``; a test builds it again
-and compares.
+It was made by ``eitskin model build --paper -o python/eitskin/model/paper.eitm``; a test builds it
+again and compares.
 """
 
 from importlib import resources
@@ -16,7 +16,7 @@ NAME = "paper.eitm"
 
 
 def load_prebuilt() -> tuple[Model, bytes]:
-    """The model of the paper's skin, and its bytes."""
+    """Return the model of the paper's skin, and its bytes."""
     try:
         blob = resources.files("eitskin.model").joinpath(NAME).read_bytes()
     except OSError:
@@ -27,8 +27,8 @@ def load_prebuilt() -> tuple[Model, bytes]:
 
 
 def load_or_prebuilt(path: Path | None) -> tuple[Model, bytes, str]:
-    """The model in the file ``path``, or without one the prebuilt, with its bytes and its name for
-    messages."""
+    """Return the model in the file ``path``, or the prebuilt model if ``path`` is None; with its
+    bytes and its name for messages."""
     if path is None:
         return *load_prebuilt(), "prebuilt paper skin"
     return *load_model(path), str(path)

@@ -1,11 +1,12 @@
-"""Random skins and touches of an [uncertainty], and what a model makes of them: the relative errors
-of its data, reduced.
+"""Draw random skins and touches from an [uncertainty], and calculate the relative errors of a
+model's data for them, reduced by P.
 
     e_all = (g o d_true - d_nominal) / |d_nominal|
 
-d_true: the change that discs make in the random skin, with the row gains g of its tare; d_nominal:
-the same discs in the skin as described. e_shape: shaped touches against discs, both in the skin as
-described. What amplitude, place and radius of the discs can explain is taken out of both.
+d_true is the change that discs cause in the random skin, with the row gains g of its tare;
+d_nominal is the change that the same discs cause in the skin as described. e_shape compares shaped
+touches with discs, both in the skin as described. The part that amplitudes, places and radii of the
+discs can explain is removed from both.
 """
 
 from dataclasses import dataclass
@@ -29,18 +30,18 @@ from eitskin.skin.uncertainty import Range, Uncertainty
 COSINES = 64
 HARMONICS = (2, 3, 4)
 MAX_TOUCHES = 3
-MARGIN, GAP = 0.04, 0.12  # R: least distance of a disc to the rim, and of two discs' edges
+MARGIN, GAP = 0.04, 0.12  # in R: least distance of a disc from the rim, and between two discs
 TRIES = 200
-STEP = 0.1  # of a disc's radius, for its derivatives
+STEP = 0.1  # of finite differences, as a part of the disc's radius
 FIELD_LENGTHS = 8
 NUMBERS_AT_ONCE = 2**21
-CELL = 0.15  # of a field's least length
+CELL = 0.15  # side of a cell, as a part of the least correlation length of a field
 
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """``skin`` under ``protocol`` on ``mesh``, and the model's data: their kind, ``fold``, and
-    ``projection`` P (r, k); and its ``grid``."""
+    """Everything that a process needs: the ``skin`` under ``protocol`` on ``mesh``, the kind of the
+    model's data, their ``fold`` and ``projection`` P (r, k), and the model's ``grid``."""
 
     skin: Skin
     protocol: Protocol
@@ -59,8 +60,8 @@ def sensitivity_of(
     v0: FloatArray,
     elements: IntArray,
 ) -> FloatArray:
-    """The change of the folded datum with the conductivity of ``elements`` (e,), (k, e): ``pairs``
-    are the fields of ``forward``, ``v0`` (k,) its voltages."""
+    """Return the change of the folded data with the conductivity of ``elements`` (e,), (k, e).
+    ``pairs`` are the fields of ``forward``, ``v0`` (k,) its voltages."""
     patterns, fold = forward.patterns, request.fold
     drive, measure = patterns.drive[fold.first], patterns.measure[fold.first]
     sign = patterns.drive_sign[fold.first] * patterns.measure_sign[fold.first]
@@ -75,7 +76,7 @@ def sensitivity_of(
 
 
 class RandomSkins:
-    """Draws samples; what they share is computed once."""
+    """Draws samples; what all samples share is computed once."""
 
     def __init__(self, request: Request) -> None:
         self.request = request
@@ -91,8 +92,8 @@ class RandomSkins:
         self.v_ref = self._fold(self.forward.voltages_of(solution))
 
     def sample(self, number: int) -> FloatArray:
-        """The sample ``number``, whatever others are drawn: P e_all (r), P e_shape (r), |e_all|,
-        |e_shape|."""
+        """Return sample ``number``: P e_all (r), P e_shape (r), |e_all|, |e_shape|. It does not
+        depend on which other samples are drawn."""
         request, asked = self.request, self.request.uncertainty
         draw = np.random.default_rng(np.random.SeedSequence(asked.seed, spawn_key=(number,)))
         mesh, conductivity, impedance = self._random_skin(draw)
@@ -112,8 +113,8 @@ class RandomSkins:
         return np.concatenate([reduced.T.ravel(), np.linalg.norm(errors, axis=0)])
 
     def error(self, rows: FloatArray) -> Float32s:
-        """P E P' (r, r) from samples (s, 2 r + 2): the second moment of e_all, and by its weight
-        that of e_shape."""
+        """Return P E P' (r, r) from samples (s, 2 r + 2): the second moment of e_all, plus that of
+        e_shape times its weight."""
         rank = len(self.request.projection)
         all_, shape = (
             np.einsum("si,sj->ij", part, part) / len(rows)
@@ -122,8 +123,8 @@ class RandomSkins:
         return as_covariance(all_ + self.request.uncertainty.touch_shapes * shape)
 
     def drift(self) -> Float32s:
-        """P D P' (r, r): D the covariance, to first order, of the data that a smooth change of the
-        skin's conductivity makes."""
+        """Return P D P' (r, r), where D is the covariance, to first order, of the data that a
+        smooth change of the skin's conductivity causes."""
         asked, mesh, r = self.request.uncertainty, self.request.mesh, len(self.request.projection)
         blocks = -(-mesh.n_elements * self.request.projection.shape[1] // NUMBERS_AT_ONCE)
         reduced = np.concatenate(
@@ -143,8 +144,8 @@ class RandomSkins:
         return as_covariance(covariance)
 
     def _gathered(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """``columns`` (r, E) of elements summed over square cells much smaller than any field's
-        length, (r, c), and the cells' middles in R, (c, 2)."""
+        """Sum ``columns`` (r, E) of elements over square cells that are much smaller than the
+        length of any field; return the sums (r, c) and the middles of the cells in R, (c, 2)."""
         side = CELL * self.request.uncertainty.background_length[0]
         cells = np.floor(self.request.mesh.centroids_mm() / (side * self.radius_mm))
         kept, number = np.unique(cells, axis=0, return_inverse=True)
@@ -162,7 +163,8 @@ class RandomSkins:
         return fold_rows(voltages, self.request.fold)
 
     def _datum(self, v: FloatArray, v0: FloatArray) -> FloatArray:
-        """The folded datum as the core makes it from ``v`` with the reference ``v0`` (k,)."""
+        """Return the folded data that the core calculates from ``v`` with the reference ``v0``
+        (k,)."""
         kind, v_ref = self.request.data_kind, self.v_ref
         weak = np.abs(v0) < RATIO_DEFINED * np.sqrt(np.mean(v0**2))
         safe = np.where(weak, 1.0, v0)
@@ -182,8 +184,8 @@ class RandomSkins:
         return sensitivity_of(self.request, self.forward, self._pairs, self.v_ref, elements)
 
     def _columns(self, disc: ShapedTouch) -> FloatArray:
-        """What a small change of the disc's amplitude, x, y and radius adds to the datum, (k, 4),
-        each of norm 1."""
+        """Return the changes of the data for small changes of the disc's amplitude, x, y and
+        radius, (k, 4), each of norm 1."""
         r, x, y = disc.radius_mm, disc.x_mm, disc.y_mm
         h = STEP * r
         elements = self.cover.near(x, y, r + h)
@@ -217,8 +219,9 @@ class RandomSkins:
         return mesh, conductivity, impedance
 
     def _random_field(self, draw: np.random.Generator, length: float) -> FloatArray:
-        """A Gaussian field of variance 1 and covariance exp(-d^2 / (2 length^2)), lengths in R, as
-        a sum of cosines (random Fourier features), at the nodes; its mean over each element."""
+        """Return the mean over each element of a Gaussian field of variance 1 and covariance
+        exp(-d^2 / (2 length^2)), lengths in R. The field is a sum of cosines (random Fourier
+        features), evaluated at the nodes."""
         waves = draw.standard_normal((COSINES, 2)) / (length * self.radius_mm)
         phases = draw.uniform(0, 2 * np.pi, COSINES)
         mesh = self.request.mesh
@@ -226,7 +229,7 @@ class RandomSkins:
         return np.asarray(at_nodes[mesh.triangles].mean(axis=1))
 
     def _random_touches(self, draw: np.random.Generator) -> tuple[ShapedTouch, ...]:
-        """One to three touches, fewer where they do not fit."""
+        """Draw one to three touches, fewer if there is no space for them."""
         asked, outline = self.request.uncertainty, self.request.skin.outline
         rim = self.request.mesh.nodes_mm[self.deformation.rim.nodes]
         x0, y0, x1, y1 = outline.bounding_box_mm
@@ -257,7 +260,7 @@ class RandomSkins:
 
 
 def rim_waves(rim: Rim) -> FloatArray:
-    """The outline's harmonics at the rim's nodes, (2 h, B)."""
+    """Return the harmonics of the outline at the rim's nodes, (2 h, B)."""
     turns = 2 * np.pi * np.outer(HARMONICS, rim.arc_mm / rim.length_mm)
     return np.vstack([np.cos(turns), np.sin(turns)])
 

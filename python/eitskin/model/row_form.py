@@ -1,8 +1,8 @@
-"""How a model was whitened, row by row (section WHIT of a .eitm file): what the core needs to
-whiten for other rows or more noise, and to find data outside the model's range.
+"""The whitening of a model, row by row (section WHIT of a .eitm file). The core needs it to whiten
+again for fewer rows or more noise, and to find data outside the model's range.
 
-The numbers are those that float32 arithmetic takes from the stored P and S, in the order of the
-rows, so that every core, on a board or on a host, works with the same.
+The numbers are calculated in float32 from the stored P and S, in the order of the rows, so every
+core, on a board or a host, uses the same numbers.
 """
 
 import struct
@@ -17,7 +17,7 @@ from eitskin.model.storage import StoredMatrix, stride_for
 
 Float32s = npt.NDArray[np.float32]
 
-ORTHOGONAL = 1e-5  # cosine between two rows of P
+ORTHOGONAL = 1e-5  # greatest cosine between two rows of P that count as orthogonal
 HEAD = struct.Struct("<3f4x")
 HUGE = 1e30
 TINY = float(np.finfo(np.float32).tiny)
@@ -25,10 +25,11 @@ TINY = float(np.finfo(np.float32).tiny)
 
 @dataclass(frozen=True, eq=False)
 class RowForm:
-    """P = diag(w) U' and S = diag(s w) V' with w = (s^2 + mu s_1^2)^-1/2, taken apart.
+    """The factors of P = diag(w) U' and S = diag(s w) V' with w = (s^2 + mu s_1^2)^-1/2.
 
-    ``mu``; ``s1``: s_1 in the units of 1 / P; ``s1_square``: |S_1|^2; and by row, (r,) float32:
-    ``scale`` 1 / (w_i s_1), ``strength`` (s_i / s_1)^2, ``energy`` |P_i|^2, ``square`` s_i^2.
+    ``mu`` is the regularisation, ``s1`` is s_1 in the units of 1 / P, and ``s1_square`` is |S_1|^2.
+    By row, (r,) float32: ``scale`` is 1 / (w_i s_1), ``strength`` is (s_i / s_1)^2, ``energy`` is
+    |P_i|^2, ``square`` is s_i^2.
     """
 
     mu: float
@@ -45,8 +46,8 @@ class RowForm:
         return HEAD.pack(self.mu, self.s1, self.s1_square) + rows.tobytes()
 
     def fits(self, projection: Float32s) -> bool:
-        """Whether a reader takes it with P = ``projection`` (r, k): each number within its range,
-        and all of a row saying the same."""
+        """Return whether a reader accepts this form for P = ``projection`` (r, k): each number is
+        within its range, and the numbers of a row agree."""
         wide = [v.astype(np.float64) for v in (self.scale, self.strength, self.energy, self.square)]
         scale, strength, energy, square = wide
         s1, sums = self.s1**2, np.sum(projection.astype(np.float64) ** 2, axis=1)
@@ -71,7 +72,7 @@ def _near(values: npt.ArrayLike, wanted: npt.ArrayLike, tolerance: float) -> boo
 
 
 def decode_row_form(content: bytes, projection: Float32s, where: str) -> RowForm:
-    """The section's numbers, of a model with P = ``projection`` (r, k)."""
+    """Return the form in section WHIT of a model with P = ``projection`` (r, k)."""
     rank = len(projection)
     stride = stride_for(rank)
     if len(content) != HEAD.size + 16 * stride:
@@ -90,7 +91,7 @@ def decode_row_form(content: bytes, projection: Float32s, where: str) -> RowForm
 
 
 def row_form(projection: Float32s, stored: StoredMatrix) -> RowForm | None:
-    """The form of P (r, k) and of S as stored; None where they have another."""
+    """Return the form of P (r, k) and of S as stored, or None if they do not have this form."""
     wide = projection.astype(np.float64)
     lengths = np.linalg.norm(wide, axis=1)
     if not lengths.min() > 0:
@@ -104,7 +105,8 @@ def row_form(projection: Float32s, stored: StoredMatrix) -> RowForm | None:
 
 
 def _taken_apart(projection: Float32s, stored: StoredMatrix) -> RowForm | None:
-    """In float32 throughout; None where |S_i|^2 + mu s_1^2 w_i^2 is not 1."""
+    """Calculate the factors, in float32 throughout; return None unless |S_i|^2 + mu s_1^2 w_i^2 is
+    1."""
     one, greatest = np.float32(1), np.abs(projection).max()
     energy = _sums_of_squares(projection)
     w2, s2 = (_sums_of_squares(rows) for rows in (projection / greatest, _decoded(stored, energy)))
@@ -126,13 +128,14 @@ def _taken_apart(projection: Float32s, stored: StoredMatrix) -> RowForm | None:
 
 
 def _decoded(stored: StoredMatrix, rows: Float32s) -> Float32s:
-    """S (r, n) as float32 arithmetic reads it, r as long as ``rows``."""
+    """Return S (r, n) as float32 arithmetic reads it, with as many rows as ``rows``."""
     columns = stored.columns[:, : len(rows)].astype(np.float32)
     return np.asarray((columns if stored.scale is None else stored.scale[:, None] * columns).T)
 
 
 def _sums_of_squares(rows: Float32s) -> Float32s:
-    """Of each row, by fused multiply-adds in float32, one column after another."""
+    """Return the sum of squares of each row, by fused multiply-adds in float32, one column after
+    another."""
     sums = np.zeros(len(rows), dtype=np.float32)
     for column in rows.astype(np.float64).T:
         sums = (column * column + sums).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Storage of the reduced Jacobian: f32, f16, or i16 and i8 with a scale per column."""
+"""Storage of the reduced Jacobian as f32, f16, or i16 and i8 with a scale per column."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -19,21 +19,22 @@ DTYPES: dict[str, np.dtype[Any]] = {
 
 
 def stride_for(rank: int) -> int:
-    """Numbers from one column to the next: the rank rounded up to a multiple of 8."""
+    """Return the count of numbers from one column to the next: the rank rounded up to a multiple of
+    8."""
     return (rank + 7) // 8 * 8
 
 
 @dataclass(frozen=True, eq=False)
 class StoredMatrix:
-    """Columns (n, stride) in the storage's own type, padded with zeros; ``scale`` (n,) float32 for
-    integers, else None."""
+    """Columns (n, stride) in the type of the storage, padded with zeros. ``scale`` (n,) float32
+    exists for integer types only."""
 
     storage: str
     columns: AnyArray
     scale: npt.NDArray[np.float32] | None
 
     def decode(self, rank: int) -> FloatArray:
-        """The matrix (rank, n) that the stored numbers stand for."""
+        """Return the matrix (rank, n) that the stored numbers represent."""
         wide = self.columns[:, :rank].astype(np.float64)
         if self.scale is not None:
             wide *= self.scale[:, None].astype(np.float64)
@@ -41,8 +42,12 @@ class StoredMatrix:
 
 
 def store(matrix: npt.ArrayLike, storage: str) -> StoredMatrix:
-    """Store ``matrix`` (r, n) as ``storage``; integers are rounded to the nearest of their column's
-    steps."""
+    """Store ``matrix`` (r, n) as ``storage``; integers are rounded to the nearest step of their
+    column.
+
+    Raises:
+        UsageError: a value does not fit the storage.
+    """
     wide = np.asarray(matrix, dtype=np.float64)
     rank, n = wide.shape
     padded = np.zeros((n, stride_for(rank)))
@@ -58,7 +63,7 @@ def store(matrix: npt.ArrayLike, storage: str) -> StoredMatrix:
         return StoredMatrix(storage, padded.astype(dtype), None)
     top = float(np.iinfo(dtype).max)
     peak = np.abs(padded).max(axis=1)
-    # a column whose step would be no normal number is taken for silent
+    # a column whose step would be subnormal gets a scale of 1, so it is stored as zeros
     scale = np.where(peak / top >= np.finfo(np.float32).tiny, peak / top, 1.0).astype("<f4")
     levels = np.clip(np.rint(padded / scale[:, None].astype(np.float64)), -top, top)
     return StoredMatrix(storage, levels.astype(dtype), scale)

@@ -1,23 +1,26 @@
-"""What the tare tells of places: sections GEOM and MOVE of a .eitm file.
+"""Compute what the tare reveals about errors of places: the sections GEOM and MOVE of a .eitm file.
 
-Where electrodes lie elsewhere and the outline is another, the untouched skin's voltages differ from
-the model's in one way, where the sheet is uneven in another; and both move touches. With causes c
-of variances V (``[uncertainty]``: each electrode's shift along the rim, the outline's harmonics,
-the sheet's smooth fields), linearised,
+If electrodes are displaced or the outline is another, the voltages of the untouched skin differ
+from the model's in one way; if the conductivity is uneven, in another way. Both displace the
+touches that are found. Let c be the causes with variances V (from ``[uncertainty]``: the shift of
+each electrode along the rim, the harmonics of the outline, smooth fields of the conductivity).
+Linearised,
 
     y = log(gain v0 / v_ref) = L c + rest,    c^ = V L' (L V L' + ROUGH^2)^-1 y,
 
-and a touch at p is found off by b(p) c, for data with the row gains of that tare, which b(p) c^
-takes back, b a polynomial of DEGREE in p. What that leaves is in proportion to how far the causes
-are from 0 on this skin. c^ is smaller than c, by r = V^-1 cov(c^) in the mean square, so that
+and a touch at p is found displaced by b(p) c, for data with the row gains of this tare. The
+correction subtracts b(p) c^, where b is a polynomial of DEGREE in p. The error that remains is
+proportional to how far the causes of this skin are from 0. c^ is smaller than c, by r = V^-1
+cov(c^) in the mean square, so
 
     sum over causes of left c^^2 / (n r V) = |N y|^2
 
-is what the variance of a place grows by: n causes of a kind leave ``left`` when they are as great
-as V says. Of electrodes, which may all turn at once, that is what the regression leaves; the
-outline's harmonics are taken back whole, and the sheet's fields not at all. N and M, of which c^ is
-made, have the ROWS directions of y that tell most; those that tell least, which no such skin has,
-show gains of single rows.
+is added to the variance of a place: n causes of a kind leave ``left`` if they are as great as V
+states. For the electrodes, which may all shift together, that is what the regression leaves. The
+harmonics of the outline count as fully corrected, and the fields of the conductivity as not
+corrected at all. N and M, from which c^ is made, use the ROWS directions of y with the most
+information. The directions with the least variance, which no such skin produces, reveal gains of
+single rows.
 """
 
 from dataclasses import dataclass
@@ -47,22 +50,22 @@ except ModuleNotFoundError as error:
     raise missing_extra("model", "scipy") from error
 
 
-ROWS = 16  # more tells nothing more, 8 too little: on the tuning family of the worlds, seed 21
-DEGREE = 4  # of 3, 4 and 5 the least that takes back what can be, on the tuning family, seed 21
-FIELDS = 80  # smooth fields of the sheet: what 20 leave looks like shifted electrodes
-MOVING = 12  # of them move touches; the others by less
-OUTSIDE = 0.1  # of ROUGH: what directions have of skins that are to tell rows' own gains
-ROUGH = 0.01  # rms of what the linearisation leaves of y
-SPACING = 0.2  # R: of the places that are looked at
-STEP = 0.01  # R: a shift or wave, for its derivatives
-FIELD_PLACES = 500  # that tell fields apart
-FIELD_STEP = 0.1  # of a field's log conductivity
-EDGE_STEP = 0.1  # of the touch's radius, for the slopes of its answer
+ROWS = 16  # more gives no gain, and 8 is too few; tuning family of the worlds, seed 21
+DEGREE = 4  # the least of 3, 4 and 5 that corrects all that can be; tuning family, seed 21
+FIELDS = 80  # smooth fields of conductivity; with 20, the rest looks like shifted electrodes
+MOVING = 12  # fields that displace touches notably; the displacement by the others is neglected
+OUTSIDE = 0.1  # in ROUGH: greatest deviation by skins in a direction that reveals gains of rows
+ROUGH = 0.01  # rms error of the linearisation of y
+SPACING = 0.2  # in R: distance between the places that are examined
+STEP = 0.01  # in R: finite difference of a shift or wave
+FIELD_PLACES = 500  # at most so many elements serve to separate the fields
+FIELD_STEP = 0.1  # finite difference of the log conductivity
+EDGE_STEP = 0.1  # finite difference of a touch's place, as a part of its radius
 LEAST_SHARE = 0.05  # r is taken as at least this
 
 
 def tare_places(skins: RandomSkins) -> TarePlaces:
-    """What the tare tells of places on ``skins``."""
+    """Return what the tare reveals about places on ``skins``."""
     causes = _Causes(skins)
     variance, logs, moves = causes.all()
     electrodes = slice(causes.electrodes)
@@ -75,19 +78,19 @@ def tare_places(skins: RandomSkins) -> TarePlaces:
     left = np.zeros(len(variance))
     left[electrodes] = np.sum(unseen * size[electrodes, electrodes]) / causes.electrodes
     left[fields] = variance[fields] @ np.diag(size)[fields] / len(left[fields])
-    drawn = variance > 0  # what the uncertainty leaves out is not looked for
+    drawn = variance > 0  # causes that the uncertainty leaves out are not estimated
     rows = np.sqrt(left / np.where(drawn, share * variance, 1.0))[:, None] * found
-    # the directions by what they tell of skins as drawn: of rows covariance^1/2
+    # directions are ranked by their variance over skins as drawn: by rows @ covariance^1/2
     values, vectors = np.linalg.eigh(covariance)
     root = (vectors * np.sqrt(values)) @ vectors.T
     inverse = (vectors / np.sqrt(values)) @ vectors.T
-    told, of_left = _strongest(rows @ root)
+    strength, of_left = _strongest(rows @ root)
     terms = causes.terms()
     polynomials = np.linalg.lstsq(terms, moves.transpose(1, 2, 0).reshape(len(terms), -1), None)[0]
     shift = polynomials.reshape(terms.shape[1], 2, -1).transpose(1, 0, 2) @ found @ root
     _, of_moves = _strongest((terms @ shift).reshape(-1, len(root)))
     return TarePlaces(
-        np.asarray(told[:, None] * of_left @ inverse, dtype=np.float32),
+        np.asarray(strength[:, None] * of_left @ inverse, dtype=np.float32),
         np.asarray(of_moves @ inverse, dtype=np.float32),
         np.asarray(shift @ of_moves.T, dtype=np.float32),
         np.asarray(_outside((logs.T * variance) @ logs), dtype=np.float32),
@@ -95,14 +98,15 @@ def tare_places(skins: RandomSkins) -> TarePlaces:
 
 
 def _outside(covariance: FloatArray) -> FloatArray:
-    """The ROWS directions (r, k) that ``covariance`` (k, k) has least of: hardly any."""
+    """Return those of the ROWS directions (r, k) with the least variance in ``covariance`` (k, k)
+    that have almost none."""
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray(vectors[:, :ROWS][:, values[:ROWS] < (OUTSIDE * ROUGH) ** 2].T)
 
 
 def _strongest(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The ROWS greatest singular values of ``matrix`` (n, k), and its directions (ROWS, k), the
-    greatest number of each above 0."""
+    """Return the ROWS greatest singular values of ``matrix`` (n, k) and their directions (ROWS, k),
+    with signs such that the greatest number of each direction is above 0."""
     _, values, directions = np.linalg.svd(matrix, full_matrices=False)
     most = directions[:ROWS]
     greatest = np.take_along_axis(most, np.abs(most).argmax(axis=1)[:, None], axis=1)
@@ -111,7 +115,7 @@ def _strongest(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @dataclass(eq=False)
 class _Causes:
-    """What each cause changes: y, and where touches are found."""
+    """The effects of each cause: on y, and on the places where touches are found."""
 
     skins: RandomSkins
     waves: int = 2 * len(HARMONICS)
@@ -141,14 +145,14 @@ class _Causes:
         reduced = [
             skins.request.projection @ columns @ weights for weights in (self._weights, *slopes)
         ]
-        # (p, 2, r): what of a place's answer says that it is elsewhere
-        self._tells = np.array([np.linalg.pinv(np.column_stack(d))[1:] for d in zip(
+        # (p, 2, r): the map from the reduced data of a touch to its displacement
+        self._displacement_of = np.array([np.linalg.pinv(np.column_stack(d))[1:] for d in zip(
             *(part.T for part in reduced), strict=True)])  # fmt: skip
         self._found = self._moved(columns, self._weights)
 
     def all(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Of c causes: variances (c,), what each adds to y (c, k), and to the places found (c, p,
-        2), mm."""
+        """Return for c causes their variances (c,), the change of y by each (c, k), and the change
+        of the places that are found (c, p, 2) in mm."""
         skins = self.skins
         asked, radius = skins.request.uncertainty, skins.radius_mm
         count, rim = self.electrodes, skins.deformation.rim
@@ -174,8 +178,8 @@ class _Causes:
         return variances, logs, moves
 
     def terms(self) -> FloatArray:
-        """1, x, y, x^2, x y, y^2 ... at ``places``, from the grid's middle over half its longer
-        side, (p, t)."""
+        """Return 1, x, y, x^2, x y, y^2 ... at ``places``, measured from the middle of the grid
+        over half its longer side, (p, t)."""
         grid = self.skins.request.grid
         half = np.array([grid.nx, grid.ny]) * grid.pixel_mm / 2
         x, y = (self.places - grid.origin_mm - half).T / half.max()
@@ -186,7 +190,8 @@ class _Causes:
     def _of_mesh(
         self, shift_mm: FloatArray, outwards_mm: FloatArray, h: float
     ) -> tuple[FloatArray, FloatArray]:
-        # both ways: y bends alike for every electrode, which looks like no shift but like a field
+        # steps in both directions: the curvature of y is alike for every electrode and would look
+        # like a field of conductivity instead of a shift
         skins, widths = self.skins, np.ones(len(shift_mm))
         ends = []
         for way in (1, -1):
@@ -197,7 +202,7 @@ class _Causes:
         return (logs - logs_back) / (2 * h), (found - found_back) / (2 * h)
 
     def _log_slope(self, field: FloatArray) -> FloatArray:
-        """dy / da (k,) of a sheet whose log conductivity is ``field`` (E,) times a."""
+        """Return dy / da (k,) for a skin whose log conductivity is ``field`` (E,) times a."""
         v_ref, normalised = self.skins.v_ref, self.skins.request.data_kind == "normalised"
         weak = np.abs(v_ref) < RATIO_DEFINED * np.sqrt(np.mean(v_ref**2))
         unit = 1.0 if normalised else np.where(weak, 1.0, v_ref)
@@ -205,7 +210,8 @@ class _Causes:
         return np.asarray(np.where(weak, 0.0, relative - v_ref**2 @ relative / (v_ref @ v_ref)))
 
     def _at(self, forward: ForwardModel, conductivity: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """y (k,) of a skin, and how far from ``places`` touches are found in it (p, 2), mm."""
+        """Return y (k,) of a skin, and how far from ``places`` touches are found in it (p, 2),
+        mm."""
         skins = self.skins
         same = forward.mesh is skins.request.mesh
         weights = self._weights if same else self._covered(forward.mesh, (0.0, 0.0))
@@ -213,15 +219,16 @@ class _Causes:
         return logs, self._moved(columns, weights)
 
     def _moved(self, columns: FloatArray, weights: csc_matrix) -> FloatArray:
-        """Where touches are found (p, 2), mm from ``places``, up to a part that all skins share."""
+        """Return where touches are found, (p, 2) in mm from ``places``, up to a part that all skins
+        share."""
         answers = self.skins.request.projection @ (columns @ weights)
-        return np.asarray(np.einsum("pir,rp->pi", self._tells, answers))
+        return np.asarray(np.einsum("pir,rp->pi", self._displacement_of, answers))
 
     def _columns(
         self, forward: ForwardModel, conductivity: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """y (k,), and the change of the datum, with the tare's gains, with each element's log
-        conductivity (k, E)."""
+        """Return y (k,), and the derivative of the data, with the tare's gains, with respect to
+        each element's log conductivity (k, E)."""
         skins = self.skins
         request, v_ref = skins.request, skins.v_ref
         solution = forward.solve(conductivity)
@@ -238,7 +245,7 @@ class _Causes:
         return np.log(ratio), columns
 
     def _covered(self, mesh: Mesh, by_mm: tuple[float, float]) -> csc_matrix:
-        """The mean relative change over each element (E, p) that touches make at ``places`` moved
+        """Return the mean relative change in each element (E, p) by touches at ``places`` moved by
         ``by_mm``."""
         cover, elements, weights = TouchCover(mesh), [], []
         for x, y in (self.places + by_mm).tolist():
@@ -250,8 +257,8 @@ class _Causes:
         return csc_matrix((np.concatenate(weights), np.concatenate(elements), begins), shape=shape)
 
     def _fields(self) -> FloatArray:
-        """The FIELDS strongest parts of the sheet's smooth field of variance 1, uncorrelated, over
-        the elements (f, E)."""
+        """Return the FIELDS strongest components of the skin's smooth field of variance 1,
+        uncorrelated, over the elements (f, E)."""
         skins = self.skins
         low, high = skins.request.uncertainty.background_length
         lengths = low + (high - low) * (np.arange(FIELD_LENGTHS) + 0.5) / FIELD_LENGTHS

@@ -19,7 +19,7 @@ from eitskin.page.reader import SessionReader
 from eitskin.session.session import Session
 from eitskin.session.set_up import take_reference
 from eitskin.session.settings import KINDS
-from eitskin.tuning.front import preset
+from eitskin.tuning.front import named_preset
 
 T = TypeVar("T")
 Answer = Future[str] | str
@@ -90,7 +90,7 @@ class PageCommands:
 
     def preset(self, name: str) -> Future[str]:
         """Scan and solver by name, and the reference for them."""
-        session, target = self._board("a preset"), preset(name, "f767")
+        session, target = self._board("a preset"), named_preset(name, "f767")
 
         def action(device: Device) -> str:
             session.apply(replace(session.settings, target=target))

@@ -1,1 +1,1 @@
-"""``eitskin reconstruct``: its steps, and what it says of them."""
+"""The steps of ``eitskin reconstruct``, and its report."""

@@ -1,4 +1,4 @@
-"""What came of recorded frames, as a table for people and as a message for programs."""
+"""The results of recorded frames, as a table for people and as a message for programs."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,23 +12,24 @@ from eitskin.session.message import frame_table, head, known
 
 
 def to_text(outcome: ReconstructOutcome) -> str:
-    """A table of the touches, then what they cost and how true they are."""
+    """Return a table of the touches, followed by their cost and, if the truth is known, their
+    errors."""
     results, scores = outcome.results, outcome.scores
     weighed = any(touch.force_n for result in results.values() for touch in result.touches)
     lines = [
-        f"frame       touch    x mm     y mm  radius mm  strength S/m mm2{'    load g' * weighed}  "
+        f"frame       touch    x mm     y mm  radius mm  strength S/m mm2{'   force g' * weighed}  "
         " error mm  solve"
     ]
     for number, result in results.items():
         lines += _lines(outcome.frames.frame_name[number][:11], result, scores.get(number), weighed)
     macs = [result.info.macs + result.info.touch_macs for result in results.values()]
-    cost = f"; median {np.median(macs) / 1e6:.2f} million MACs a frame" if any(macs) else ""
+    cost = f"; median {np.median(macs) / 1e6:.2f} million MACs per frame" if any(macs) else ""
     lines.append(f"{len(results)} frames, {len(outcome.refused)} refused{cost}")
     if scores:
         facts = summary(scores)
         lines.append(
-            f"against the truth of {facts['frames']} frames: {facts['found']} of {facts['true']}"
-            f" touches found, {facts['false']} false; position error median"
+            f"compared with the truth of {facts['frames']} frames: {facts['found']} of"
+            f" {facts['true']} touches found, {facts['false']} false; position error median"
             f" {facts['position_median_mm']:.2f} mm, worst {facts['position_worst_mm']:.2f} mm;"
             f" MIoU image {facts['miou_image']:.3f}, touches {facts['miou_touches']:.3f}"
         )
@@ -38,7 +39,8 @@ def to_text(outcome: ReconstructOutcome) -> str:
 def _lines(
     label: str, result: Reconstruction, score: FrameScore | None, weighed: bool
 ) -> Iterator[str]:
-    """A line a touch of one frame; a line where there is none, and one for what was found wrong."""
+    """Yield a line per touch of a frame, or one line if there is none, and one for the
+    diagnostics."""
     info = result.info
     cost = solve_text(
         info.iterations,
@@ -60,11 +62,12 @@ def _lines(
             f"{'' if k else f'  {cost}'}".rstrip()
         )
     if info.diagnostics:
-        yield f"{'':11} found: {'; '.join(info.found)}"
+        yield f"{'':11} diagnostics: {'; '.join(info.found)}"
 
 
 def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:
-    """The scores of all frames in a few numbers; positions are NaN where nothing was found."""
+    """Return the scores of all frames in a few numbers; position errors are NaN if no touch was
+    found."""
     matchings = [score.matching for score in scores.values()]
     distances = [d for matching in matchings for d in matching.distances_mm]
     hits = sum(matching.hits for matching in matchings)
@@ -81,25 +84,25 @@ def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:
 
 
 def to_json(outcome: ReconstructOutcome) -> dict[str, Any]:
-    """Everything that the text says, and more, for programs: a message of type "reconstruction"
+    """Return everything that the text states, and more, as a message of type "reconstruction"
     (docs/reference/message.md)."""
     listed = [_entry(outcome, k) for k in sorted({*outcome.results, *outcome.refused})]
-    whole = head("reconstruction") | {
+    message = head("reconstruction") | {
         "model": outcome.model_name,
         "engine": outcome.engine,
         "frames": listed,
     }
     if outcome.point is not None:
         settings = outcome.point.configuration.as_dict()
-        whole["settings"] = settings | {"mask_threshold": outcome.point.threshold}
+        message["settings"] = settings | {"mask_threshold": outcome.point.threshold}
     if outcome.scores:
         facts = summary(outcome.scores)
-        whole["summary"] = {key: known(value) for key, value in facts.items()}
-    return whole
+        message["summary"] = {key: known(value) for key, value in facts.items()}
+    return message
 
 
 def _entry(outcome: ReconstructOutcome, number: int) -> dict[str, Any]:
-    """A frame's message."""
+    """Return the message of a frame."""
     frames, result = outcome.frames, outcome.results.get(number)
     time_s = None if frames.time_s is None else float(frames.time_s[number])
     if result is None:

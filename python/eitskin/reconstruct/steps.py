@@ -1,8 +1,8 @@
-"""Recorded frames to touches and images, step by step:
+"""Reconstruct recorded frames, step by step:
 
     read -> choose the model -> take the reference -> solve -> score against the truth -> write
 
-:func:`reconstruct_frames` does these; ``report`` says what came of it.
+:func:`reconstruct_frames` runs these steps; ``report`` describes the result.
 """
 
 import math
@@ -27,8 +27,8 @@ from eitskin.progress import Progress, silent
 from eitskin.scoring.score import FrameScore, scorer_for
 from eitskin.solve.batch import Batch, check_threads
 from eitskin.solve.reconstructor import MIN_CORRELATION, Reconstructor
-from eitskin.tuning.for_model import chosen_point, settings_text
-from eitskin.tuning.front import Point, Target
+from eitskin.tuning.for_model import operating_point_for, settings_text
+from eitskin.tuning.front import OperatingPoint, Preset
 from eitskin.view.film import check_film
 from eitskin.view.frame_pictures import draw_results, film_results
 from eitskin.view.panels import check_picture
@@ -38,61 +38,62 @@ Results = dict[int, Reconstruction]
 
 @dataclass(frozen=True)
 class ReconstructSettings:
-    """How frames are reconstructed.
+    """The settings for reconstructing frames.
 
     Attributes:
-        model: an .eitm file; None: the prebuilt model of the paper's skin.
+        model: an .eitm file; None is the prebuilt model of the paper's skin.
         engine: "c", "c64" or "numpy".
         changes: options of the solver by name (``core.results.Options``).
-        wish: a budget or an accuracy, whose measured settings are taken; or None.
-        track: touches are followed from frame to frame, as a board does; None: where the frames
-            are a stream, which their times tell, and threads is 1.
-        threads: frames side by side, the same results; 1 with a warm start, tracking or numpy.
-        only: names of the frames to reconstruct; None: all.
+        preset: a preset whose measured settings are used; or None.
+        track: whether touches are tracked from frame to frame, as a board does; None tracks them if
+            the frames are a stream, which their times show, and ``threads`` is 1.
+        threads: how many frames are solved in parallel, with the same results; it must be 1 with a
+            warm start, tracking or numpy.
+        only: names of the frames to reconstruct; None is all.
     """
 
     model: Path | None = None
     engine: str = "c"
     changes: dict[str, Any] = field(default_factory=dict)
-    target: Target | None = None
+    preset: Preset | None = None
     track: bool | None = None
     threads: int = 1
     only: tuple[str, ...] | None = None
 
     @property
     def follows(self) -> bool:
-        """Whether a frame's result depends on the frames before."""
+        """Return whether the result of a frame depends on earlier frames."""
         return bool(self.track) or bool(self.changes.get("warm_start"))
 
     def tracked(self, frames: Frames) -> bool:
-        """Whether touches of ``frames`` are followed."""
+        """Return whether the touches of ``frames`` are tracked."""
         return is_stream(frames) and self.threads == 1 if self.track is None else self.track
 
 
 def is_stream(frames: Frames) -> bool:
-    """Whether the frames came one after another: they have times that ascend."""
+    """Return whether the frames form a stream, which means that their times ascend."""
     times = frames.time_s
     return times is not None and len(times) > 1 and bool(np.all(np.diff(times) > 0))
 
 
 @dataclass(frozen=True, eq=False)
 class ReconstructOutcome:
-    """What came of the frames.
+    """The outcome of a reconstruction.
 
     Attributes:
-        frames, model, model_name, engine: what was reconstructed, with what.
-        point: the measured point that a budget chose; or None.
-        reference: as learned from the untouched frames.
-        results, refused: by the frame's number: the result, or why there is none.
-        scores: by number, where the frames carry the truth.
-        notes: what a user should know, a line each.
+        frames, model, model_name, engine: what was reconstructed, and how.
+        point: the operating point that the preset chose; or None.
+        reference: the reference as learned from the untouched frames.
+        results, refused: by frame number, the result or the reason why there is none.
+        scores: by frame number, if the frames hold the truth.
+        notes: lines that the user should see.
     """
 
     frames: Frames
     model: Model
     model_name: str
     engine: str
-    point: Point | None
+    point: OperatingPoint | None
     reference: LearnedReference
     results: Results
     refused: dict[int, str]
@@ -109,9 +110,18 @@ def reconstruct_frames(
     film: Path | None = None,
     progress: Progress = silent,
 ) -> ReconstructOutcome:
-    """Reconstruct the frames of the file ``path``; those that cannot be used are named in
-    ``refused``, and the others are still done. Images, touches and info go into the file ``output``
-    (.npz), a ``picture`` shows the frames, a ``film`` one after another."""
+    """Reconstruct the frames of the file ``path``.
+
+    Frames that cannot be used are named in ``refused``, and the others are still reconstructed.
+    Images, touches and info are written to the file ``output`` (.npz); a ``picture`` shows all
+    frames, and a ``film`` shows them one after another.
+
+    Raises:
+        FileError: a file cannot be read or written.
+        UsageError: the settings contradict each other, or the preset cannot be fulfilled.
+        FrameError, ProtocolError: the frames, or their untouched frames, cannot be used with the
+            model.
+    """
     how = settings or ReconstructSettings()
     check(how, output, picture, film)
     notes: list[str] = []
@@ -134,21 +144,18 @@ def reconstruct_frames(
 def check(
     how: ReconstructSettings, output: Path | None, picture: Path | None, film: Path | None = None
 ) -> None:
-    """Refuse what cannot be, before any file is read."""
+    """Reject invalid settings before any file is read."""
     if check_threads(how.threads) > 1:
         reasons = {
             "--warm starts each frame from the last one": how.changes.get("warm_start"),
             "--track needs one frame after another": how.track,
-            "the numpy engine has one": how.engine == "numpy",
+            "the numpy engine uses one thread": how.engine == "numpy",
         }
         for reason, applies in reasons.items():
             if applies:
                 raise UsageError(f"--threads {how.threads}: {reason}; use --threads 1")
-    if how.target is not None and how.engine != "c":
-        raise UsageError(
-            "--preset, --budget and --accuracy are of the C core in float32; leave  --engine"
-            f" {how.engine}  out"
-        )
+    if how.preset is not None and how.engine != "c":
+        raise UsageError(f"--preset needs the C core in float32; leave out  --engine {how.engine}")
     refuse_unwritable(output, picture, film)
     if picture is not None or film is not None:
         check_picture(picture)
@@ -156,7 +163,7 @@ def check(
 
 
 def read(path: Path, only: tuple[str, ...] | None) -> tuple[Frames, list[int]]:
-    """The frames, and the numbers of those that are named in ``only``."""
+    """Return the frames, and the numbers of those named in ``only`` (None: all)."""
     frames = load_frames(path, allow_nonfinite=True)
     if not frames.n_frames:
         raise FrameError(f"{path}: holds a reference but no frame; nothing to reconstruct")
@@ -173,7 +180,8 @@ def read(path: Path, only: tuple[str, ...] | None) -> tuple[Frames, list[int]]:
 def choose_model(
     path: Path, frames: Frames, how: ReconstructSettings
 ) -> tuple[Reconstructor, bytes, str]:
-    """The model that fits the frames, its bytes and name."""
+    """Return a reconstructor with the model for the frames, the bytes of the model, and its
+    name."""
     model, blob, name = load_or_prebuilt(how.model)
     reconstructor = Reconstructor(model, engine=how.engine, blob=blob)
     try:
@@ -184,7 +192,7 @@ def choose_model(
 
 
 def know_converter(reconstructor: Reconstructor, frames: Frames) -> None:
-    """The steps of the frames' converter, where they tell, are the least noise of a row."""
+    """Set the least noise of a row from the converter's step, if the frames state it."""
     step_v = frames.meta.get("lsb_v")
     if isinstance(step_v, (int, float)) and 0 < step_v < math.inf:
         reconstructor.set_options(noise_floor_v=step_v / math.sqrt(12))
@@ -192,17 +200,18 @@ def know_converter(reconstructor: Reconstructor, frames: Frames) -> None:
 
 def apply_options(
     reconstructor: Reconstructor, how: ReconstructSettings, notes: list[str]
-) -> Point | None:
-    """Give the solver its options; with a wish those of the measured point that fulfils it."""
+) -> OperatingPoint | None:
+    """Set the solver's options; with a preset, set and return the operating point that fulfils
+    it."""
     reconstructor.set_options(**how.changes)
     if how.track:
         reconstructor.set_options(tracking(reconstructor.options))
-    if how.target is None:
+    if how.preset is None:
         return None
 
-    point = chosen_point(how.target, reconstructor.model, reconstructor.options)
+    point = operating_point_for(how.preset, reconstructor.model, reconstructor.options)
     reconstructor.set_options(**point.configuration.solver_settings)
-    notes.append(settings_text(point, how.target.board))
+    notes.append(settings_text(point, how.preset.board))
     return point
 
 
@@ -216,8 +225,8 @@ def take_reference(
         raise FrameError(f"{path}: {error}; run  eitskin doctor {path}") from None
     if reference.correlation < MIN_CORRELATION:
         notes.append(
-            f"warning: the reference correlates with the model by {reference.correlation:.3f}"
-            f" only; run  eitskin doctor {path}"
+            f"warning: the reference correlates with the model only by {reference.correlation:.3f};"
+            f" run  eitskin doctor {path}"
         )
     if reference.outliers:
         notes.append(
@@ -234,7 +243,8 @@ def solve(
     how: ReconstructSettings,
     progress: Progress,
 ) -> tuple[Results, dict[int, str]]:
-    """The results of the ``chosen`` frames, and why there is none, by number."""
+    """Return the results of the ``chosen`` frames, and for the others the reason, by frame
+    number."""
     if how.threads > 1:
         batch = Batch(
             reconstructor.model,
@@ -270,9 +280,14 @@ def _one_by_one(
 
 
 def score(
-    model: Model, frames: Frames, results: Results, sign: str, point: Point | None, notes: list[str]
+    model: Model,
+    frames: Frames,
+    results: Results,
+    sign: str,
+    point: OperatingPoint | None,
+    notes: list[str],
 ) -> dict[int, FrameScore]:
-    """The results against the truth, where the frames carry it."""
+    """Compare the results with the truth, if the frames hold it."""
     if frames.touch_frame is None and frames.truth_mask is None:
         return {}
 
@@ -294,7 +309,7 @@ def write(
     film: Path | None = None,
     progress: Progress = silent,
 ) -> None:
-    """The file of results, the film and the picture, where there is something to show."""
+    """Write the file of results, the film and the picture, if there is any result."""
     if output is not None and outcome.results:
         save_results(output, outcome.model, outcome.frames, outcome.results)
     if film is not None and outcome.results:

@@ -1,1 +1,1 @@
-"""Touches and the frames they would give."""
+"""Scenes: touches on a simulated skin, and the frames that they produce."""

@@ -1,4 +1,4 @@
-"""A scene as what lies before a simulated or emulated board."""
+"""The frames of a scene for a simulated or emulated board."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -9,14 +9,17 @@ from eitskin.arrays import FloatArray
 from eitskin.scene.description import Scene
 from eitskin.skin.protocol import Protocol, in_order, table
 
-WHOLE_FRAMES = 512  # a scene of no more frames, quiet ones included, is simulated at once
-WINDOW_FRAMES = 64  # of a longer one: so many are compiled together, and made one at a time
-SAME_S = 1e-7  # rows so near to a frame's own are its own
-HEADROOM = 2.0  # of a longer one's range over its first quiet frames: touches may raise voltages
+# A scene with up to so many frames, untouched ones included, is simulated at once.
+WHOLE_FRAMES = 512
+WINDOW_FRAMES = 64  # frames of a longer scene that are compiled together and made one at a time
+SAME_S = 1e-7  # rows within this time of a frame's own rows count as the same
+# Range of a longer scene over the voltages of its first untouched frames, as touches may raise
+# voltages.
+HEADROOM = 2.0
 
 
 class BoardFrames:
-    """The frames of ``scene`` for whatever protocol a board scans; each protocol is prepared once.
+    """The frames of ``scene`` for any protocol that a board scans; each protocol is prepared once.
     Effects named in ``without`` are left to the board."""
 
     def __init__(self, scene: Scene, without: Collection[str] = ()) -> None:
@@ -25,7 +28,12 @@ class BoardFrames:
         self._rows: dict[tuple[int, tuple[int, ...]], SceneRows] = {}
 
     def rows(self, protocol: Protocol) -> "SceneRows":
-        """The frames in the rows of ``protocol``. Electrodes that it does not name stay unused."""
+        """Return the frames in the rows of ``protocol``. Electrodes that the protocol does not name
+        stay unused.
+
+        Raises:
+            ConfigError, ProtocolError: as ``prepare_scene`` and ``table``.
+        """
         key, own = (protocol.hash, protocol.drive_order), self.scene.protocol
         if key not in self._rows:
             scene = self.scene
@@ -37,13 +45,15 @@ class BoardFrames:
         return self._rows[key]
 
     def voltage_v(self, protocol: Protocol) -> FloatArray:
-        """All of them, (n, m) in V: the scene's quiet frames, then its own. Raises as ``rows``."""
+        """Return all frames (n, m) in V: the untouched frames of the scene, then the others. Errors
+        are those of ``rows``."""
         return self.rows(protocol).part(range(self.scene.n_frames))
 
 
 class SceneRows:
-    """All frames of ``scene``, quiet ones first, made as they are asked for; the same values in
-    whatever order. Of a long scene only the last ``WINDOW_FRAMES`` are kept."""
+    """All frames of ``scene``, untouched ones first, made when they are asked for. The values do
+    not depend on the order of requests. Of a long scene only the last ``WINDOW_FRAMES`` are
+    kept."""
 
     def __init__(self, scene: Scene) -> None:
         from eitskin.scene.compiler import prepare_scene
@@ -51,7 +61,7 @@ class SceneRows:
 
         self.scene = scene
         self._prepared = prepare_scene(scene, mesh_cache=MeshCache())
-        self.solves = 0  # for whoever counts: right-hand sides solved so far
+        self.solves = 0  # number of right-hand sides solved so far
         self._window = range(0)
         whole = scene.n_frames <= WHOLE_FRAMES
         self._size = scene.n_frames if whole else WINDOW_FRAMES
@@ -59,25 +69,27 @@ class SceneRows:
             track.moves or np.isfinite(track.keyframes[0].t_s) or not track.hold
             for track in scene.touches
         )
-        """Whether touches change while they are scanned: each scan has rows of its own."""
+        """Whether touches change during a scan, so that each scan has its own rows."""
         first = self.part(range(scene.n_frames if whole else min(scene.quiet_frames, self._size)))
         largest = float(np.abs(np.asarray(first, np.float32)).max(initial=0))
         self.largest_v = largest if whole else HEADROOM * largest
-        """None is above it in a scene that was simulated at once; in a long one what is above it
-        is beyond the range of a simulated converter."""
+        """The range of a simulated converter. A scene that was simulated at once has no greater
+        voltage; greater voltages of a long scene are out of range."""
 
     def around(self, frame: int) -> tuple[int, FloatArray]:
-        """Frames (k, m) among which is number ``frame``, and the number of the first of them: of a
-        long scene only this one, since each takes its time; where touches move, the quiet ones or
-        this one, with its rows as in its own scan."""
+        """Return frames (k, m) that include number ``frame``, and the number of the first of them.
+        For a long scene this is only the frame itself, since each frame takes time. If touches
+        move, it is either the untouched frames or the frame itself with the rows of its own
+        scan."""
         quiet = self.scene.quiet_frames
         if self._size == self.scene.n_frames and not (self.moves and frame >= quiet):
             return 0, self.part(range(quiet if self.moves else self._size))
         return frame, self.part(range(frame, frame + 1))
 
     def scan(self, frame: int, row_times_s: FloatArray) -> FloatArray:
-        """Recorded frame number ``frame`` (m,), quiet ones counted, with rows at ``row_times_s``
-        (m,) after the scene's time 0; after the last frame's scan all stays as it is."""
+        """Return the frame number ``frame`` (m,), untouched ones included, with its rows measured
+        at ``row_times_s`` (m,) after the scene's time 0. After the scan of the last frame nothing
+        changes any more."""
         scene, recorded = self.scene, frame - self.scene.quiet_frames
         nominal = recorded / scene.rate_hz + scene.row_delays_s
         if not self.moves or np.abs(row_times_s - nominal).max() < SAME_S:
@@ -90,13 +102,13 @@ class SceneRows:
         return volts
 
     def part(self, frames: range) -> FloatArray:
-        """``frames`` (k, m) in V."""
+        """Return ``frames`` (k, m) in V."""
         if not len(frames):
             return np.zeros((0, self.scene.protocol.n_rows))
         return np.array([self._frame(frame) for frame in frames])
 
     def _open(self, frame: int) -> None:
-        """Compile the window that ``frame`` is in, where it is another than before."""
+        """Compile the window that contains ``frame``, unless it is the current one."""
         from eitskin.scene.compiler import compile_frames
         from eitskin.scene.runner import FrameMaker
 

@@ -1,8 +1,9 @@
-"""A scene becomes a list of steps that is fixed before the first frame: ``compile_scene``.
+"""Compile a scene to a list of steps that is fixed before the first frame: ``compile_scene``.
 
-Only the effects that the scene names are imported and made. What can be known before solving is
-worked out here: which frames and rows share a state of sheet, touches and contacts, and whether
-touches are solved by factorisation or by update. The frame loop (``runner.py``) then asks nothing.
+Only the effects that the scene names are imported and made. Whatever can be known before solving is
+worked out here: which frames and rows share a state of skin, touches and contacts, and whether
+touches are solved by factorisation or by update. The frame loop (``runner.py``) then makes no
+decisions.
 """
 
 from collections.abc import Callable, Sequence
@@ -47,8 +48,8 @@ NO_CHANGE = Change(np.zeros(0, np.int64), np.zeros(0))
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A distinct state of sheet, touches and contacts: one forward solve. ``frame`` is the first
-    that has it."""
+    """A distinct state of skin, touches and contacts, which needs one forward solve. ``frame`` is
+    the first frame that has it."""
 
     touches: tuple[TrueTouch, ...]
     change: Change
@@ -58,8 +59,8 @@ class State:
 
 
 class States:
-    """The distinct states of a scene's ``frames``, numbered in the order that they are first asked
-    for, and which of them each row has at given instants."""
+    """The distinct states of a scene's ``frames``, numbered in the order in which they are first
+    asked for, and the states of each row at given instants."""
 
     def __init__(self, scene: Scene, cover: Cover, steps: Sequence[Step], frames: range) -> None:
         self._scene, self._cover, self._frames = scene, cover, frames
@@ -72,7 +73,7 @@ class States:
         self.motion = Motion(scene.touches, size_to_paper(scene.skin.outline))
 
     def of(self, frame: int, touches: tuple[TrueTouch, ...]) -> int:
-        """The number of the state that ``frame`` has with ``touches``."""
+        """Return the number of the state that ``frame`` has with ``touches``."""
         place = frame - self._frames.start
         contact = self._contacts[place if len(self._contacts) > 1 else 0]
         time_s = (frame - self._scene.quiet_frames) / self._scene.rate_hz
@@ -88,13 +89,13 @@ class States:
         return self._number[key]
 
     def change(self, touches: tuple[TrueTouch, ...]) -> Change:
-        """What ``touches`` do to the sheet."""
+        """Return how ``touches`` change the conductivity."""
         if touches not in self._changes:
             self._changes[touches] = Change(*self._cover.factor(touches))
         return self._changes[touches]
 
     def mix(self, frame: int, times_s: FloatArray) -> Mix:
-        """The states of ``frame``'s rows at their instants (m,)."""
+        """Return the states of ``frame``'s rows at their instants (m,)."""
         if frame < self._scene.quiet_frames:
             return self._same(self.of(frame, ()), len(times_s))
         mix, touches_of = self.motion.at(times_s), self.motion.states
@@ -111,23 +112,25 @@ class States:
 
 @dataclass(frozen=True, eq=False)
 class Compiled:
-    """A scene ready to run; nothing in it changes any more but ``work``, which counts, and
-    ``table``, which grows where rows are asked for at other instants.
+    """A scene ready to run. Nothing in it changes any more, except ``work``, which counts, and
+    ``table``, which grows if rows at other instants are asked for.
 
     Attributes:
-        skin: as it truly is, after geometry steps.
-        steps: those of the named effects, in the order that they run.
-        parameters: of each effect.
-        frames: which of all frames, quiet ones first, are compiled; n of them.
-        states: solved once each; ``state_of_frame`` (n,) says which one a frame has, -1 where
-            touches move while it is scanned: then ``mixes`` says it, by the frame's place in
-            ``frames``. ``table`` has them, and those of other instants.
-        known: potentials of states that were solved already, for V0.
-        base_factors: those of the untouched skin, made for V0 and used again by the update.
-        functions: from a state's true voltages to the recorded ones, for each frame.
-        bridge_pairs: electrodes that some state bridges.
-        method: "factorise" or "update"; ``counted`` says why, where it was a choice.
-        reach: the unknowns that touches ever reach, for the update.
+        skin: the true skin, after geometry steps.
+        steps: the steps of the named effects, in the order in which they run.
+        parameters: the parameters of each effect.
+        frames: which of all frames, untouched ones first, are compiled; n of them.
+        states: the states, each solved once. ``state_of_frame`` (n,) gives the state of each frame,
+            or -1 if touches move during its scan; then ``mixes`` gives its states, by the frame's
+            place in ``frames``. ``table`` holds these states and those of other instants.
+        known: potentials of states that were already solved, for V0.
+        base_factors: the factors of the untouched skin, made for V0 and used again by the update.
+        functions: the functions that convert the true voltages of a state to the recorded ones, for
+            each frame.
+        bridge_pairs: the electrodes that any state bridges.
+        method: "factorise" or "update"; ``counted`` holds the costs that decided, if there was a
+            choice.
+        reach: the unknowns that any touch reaches, for the update.
     """
 
     scene: Scene
@@ -153,14 +156,14 @@ class Compiled:
     work: SessionWork
 
     def times_s(self) -> FloatArray:
-        """The compiled frames' times (n,), below 0 for quiet ones."""
+        """Return the times of the compiled frames (n,), below 0 for untouched ones."""
         numbers = np.arange(self.frames.start, self.frames.stop)
         return np.asarray((numbers - self.scene.quiet_frames) / self.scene.rate_hz)
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """What of a compiled scene does not depend on its frames: made once, however many frames."""
+    """The part of a compiled scene that does not depend on its frames. It is made once."""
 
     scene: Scene
     skin: Skin
@@ -173,14 +176,21 @@ class Prepared:
 
     @property
     def as_described(self) -> bool:
-        """Whether the sheet that is solved is the described one: nothing changes it but touches."""
+        """Return whether the skin that is solved is the described one, changed by nothing except
+        touches."""
         return all(step.stage >= Stage.FRONT_END or _is_voltage(step) for step in self.steps)
 
 
 def compile_scene(
     scene: Scene, *, registry: Registry | None = None, mesh_cache: MeshCache | None = None
 ) -> Compiled:
-    """Compile ``scene``; ``mesh_cache`` lends the meshes and untouched skins of scenes before."""
+    """Compile ``scene``; ``mesh_cache`` provides the meshes and untouched skins of earlier scenes.
+
+    Raises:
+        ConfigError, GeometryError, ProtocolError: an effect is unknown, or the scene and its
+            effects do not fit together.
+        MissingExtraError: the mesher is not installed.
+    """
     prepared = prepare_scene(scene, registry=registry, mesh_cache=mesh_cache)
     return compile_frames(prepared, range(scene.n_frames))
 
@@ -188,7 +198,7 @@ def compile_scene(
 def prepare_scene(
     scene: Scene, *, registry: Registry | None = None, mesh_cache: MeshCache | None = None
 ) -> Prepared:
-    """Import and make the effects of ``scene``; raises as ``compile_scene``."""
+    """Import and make the effects of ``scene``; errors are those of ``compile_scene``."""
     mesh_cache, work = MeshCache() if mesh_cache is None else mesh_cache, SessionWork()
     modules = load_effects(scene, Registry() if registry is None else registry)
     parameters = {
@@ -203,8 +213,8 @@ def prepare_scene(
 
 
 def compile_frames(prepared: Prepared, frames: range) -> Compiled:
-    """Compile only ``frames`` of a prepared scene, of all frames, quiet ones first. Raises as
-    ``compile_scene``."""
+    """Compile only ``frames`` of a prepared scene, out of all frames, untouched ones first. Errors
+    are those of ``compile_scene``."""
     scene, skin, steps = prepared.scene, prepared.skin, prepared.steps
     phase, mesh_cache, work = prepared.phase, prepared.mesh_cache, prepared.work
     table = States(scene, mesh_cache.cover(skin, scene.elements), steps, frames)
@@ -225,7 +235,7 @@ def compile_frames(prepared: Prepared, frames: range) -> Compiled:
         known = {
             k: electrodes for k, s in enumerate(states) if electrodes is not None and not s.touches
         }
-    gone = any(state.contacts.detached.any() for state in states)
+    detached = any(state.contacts.detached.any() for state in states)
     loaded = any(isinstance(step, LoadedStep) for step in steps)
     solved, factorised = (len(states), len(known)), base_factors is not None
     return Compiled(
@@ -243,7 +253,7 @@ def compile_frames(prepared: Prepared, frames: range) -> Compiled:
         known=known,
         base_factors=base_factors,
         functions=_functions(steps, phase),
-        needs_whole_reader=bool(pairs) or gone or loaded,
+        needs_whole_reader=bool(pairs) or detached or loaded,
         bridge_pairs=pairs,
         method=method,
         reach=reach,
@@ -256,10 +266,10 @@ def compile_frames(prepared: Prepared, frames: range) -> Compiled:
 
 
 def background_of(compiled: Compiled) -> Callable[[State], FloatArray]:
-    """A function from a state to its sheet's conductivity (E,) without touches.
+    """Return a function from a state to the conductivity (E,) of its skin without touches.
 
-    Steps before the first that varies are applied once, here; the others for each state, at the
-    time of its frame.
+    Steps before the first varying one are applied once, here; the others are applied for each
+    state, at the time of its frame.
     """
     scene, times, start = compiled.scene, compiled.times_s(), compiled.frames.start
     materials = [step for step in compiled.steps if isinstance(step, MaterialStep)]
@@ -306,7 +316,7 @@ def _is_voltage(step: Step) -> bool:
 
 
 def used_in(mix: Mix) -> list[int]:
-    """The states that ``mix`` is of, ascending."""
+    """Return the numbers of the states that ``mix`` uses, ascending."""
     needed = np.concatenate([mix.lower, mix.upper[mix.part > 0]])
     return [int(k) for k in np.unique(needed)]
 
@@ -314,7 +324,8 @@ def used_in(mix: Mix) -> list[int]:
 def _states_of_frames(
     scene: Scene, states: States, frames: range
 ) -> tuple[IntArray, dict[int, Mix]]:
-    """Which state each of ``frames`` has (n,), -1 where touches move in it, and what those have."""
+    """Return the state of each of ``frames`` (n,), -1 if touches move during the frame, and the
+    mixes of those frames."""
     state_of_frame, mixes = np.zeros(len(frames), np.int64), {}
     recorded = range(max(frames.start - scene.quiet_frames, 0), frames.stop - scene.quiet_frames)
     samples, delays_s = scene.samples(recorded) if scene.frozen else (), scene.row_delays_s
@@ -333,12 +344,13 @@ def _states_of_frames(
 
 
 def contact_key(contacts: Contacts) -> tuple[bytes, bytes, tuple[tuple[int, int, float], ...]]:
-    """Equal for equal contacts."""
+    """Return a key that is equal for equal contacts."""
     return contacts.impedance_ohm_m2.tobytes(), contacts.detached.tobytes(), contacts.bridges
 
 
 def _contacts(scene: Scene, steps: Sequence[Step], frames: range) -> list[Contacts]:
-    """The contacts of each of ``frames``, or of all of them (one) where nothing varies."""
+    """Return the contacts of each of ``frames``, or a single entry for all of them if nothing
+    varies."""
     own = [step for step in steps if isinstance(step, ContactStep)]
     count, rows = scene.skin.electrodes.count, scene.protocol.drive_measure.astype(np.int64)
     varies, found = any(step.varies for step in own), []
@@ -355,7 +367,7 @@ def _contacts(scene: Scene, steps: Sequence[Step], frames: range) -> list[Contac
             raise ConfigError(
                 f"{detaching or scene.where}: at {time_s:g} s electrodes"
                 f" {np.flatnonzero(contacts.detached).tolist()} (from 0) are detached, and no row"
-                " of the protocol is left that can be measured; detach fewer"
+                " of the protocol can be measured; detach fewer"
             )
         found.append(contacts)
     return found
@@ -370,23 +382,23 @@ def _check_contacts(contacts: Contacts, count: int, where: str) -> None:
     for i, j, ohm in contacts.bridges:
         if not (0 <= i < count and 0 <= j < count and i != j and 0 <= ohm < np.inf):
             raise ConfigError(
-                f"{where}: a bridge of {ohm:g} ohm between electrodes {i} and {j} (from 0) cannot"
-                f" be; name two different ones of 0 to {count - 1} and at least 0 ohm"
+                f"{where}: a bridge of {ohm:g} ohm between electrodes {i} and {j} (from 0) is not"
+                f" possible; name two different ones of 0 to {count - 1} and at least 0 ohm"
             )
 
 
 def _choose_method(
     scene: Scene, model: ForwardModel, states: Sequence[State], steps: Sequence[Step]
 ) -> tuple[str, IntArray, UpdateCost | None]:
-    """How to solve, the unknowns that touches reach (for the update), and the count that decided
-    it."""
+    """Choose how to solve; return the method, the unknowns that touches reach (for the update), and
+    the counted costs that decided."""
     nothing = np.zeros(0, np.int64)
     changing = (DeformationStep, MaterialStep, ContactStep)
     varying = [step.name for step in steps if isinstance(step, changing) and step.varies]
     if varying and scene.solver == "update":
         raise ConfigError(
-            f'{scene.where} [scene]: solver = "update" needs sheet and contacts that stay, but'
-            f' [effects.{varying[0]}] changes them; use "auto"'
+            f'{scene.where} [scene]: solver = "update" needs a skin and contacts that do not'
+            f' change, but [effects.{varying[0]}] changes them; use "auto"'
         )
     moves = any(track.moves for track in scene.touches)
     if varying or scene.solver == "factorise" or (scene.solver == "auto" and not moves):
@@ -401,8 +413,8 @@ def _choose_method(
 
 
 def _functions(steps: Sequence[Step], phase: PhaseStep | None) -> tuple[VoltageFunction, ...]:
-    """The per-frame line from true voltages to recorded ones; a phase step's readout stands before
-    the digitising."""
+    """Return the functions that convert true voltages to recorded ones, frame by frame. The readout
+    of a phase step comes before digitising."""
     of_volts = [step for step in steps if _is_voltage(step)]
     before = [_function(step) for step in of_volts if step.stage < Stage.DIGITISE]
     after = [_function(step) for step in of_volts if step.stage >= Stage.DIGITISE]

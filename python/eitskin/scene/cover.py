@@ -1,4 +1,4 @@
-"""Which elements of a mesh a touch covers, and how much of each."""
+"""Compute which elements of a mesh a touch covers, and which part of each."""
 
 from collections.abc import Iterable
 
@@ -14,10 +14,11 @@ MIN_FACTOR = 1e-3
 
 
 class Cover:
-    """Elements under touches on one mesh; what does not depend on the touch is computed once.
+    """Finds the elements under touches on one mesh. Whatever does not depend on the touch is
+    computed once.
 
-    Each element near the disc is split into ``subdivision`` squared equal triangles, whose centres
-    are looked at.
+    Each element near the disc is split into ``subdivision`` squared equal triangles; the touch is
+    evaluated at their centres.
     """
 
     def __init__(self, mesh: Mesh, subdivision: int = SUBDIVISION) -> None:
@@ -27,8 +28,9 @@ class Cover:
         self._weights = centres_of_parts(subdivision)
 
     def of(self, touch: TrueTouch) -> tuple[IntArray, FloatArray]:
-        """The elements that ``touch`` meets (e,), ascending, and what part of each it covers (e,),
-        in (0, 1]; of a shape, its mean change there over that in the middle."""
+        """Return the elements (e,) that ``touch`` meets, ascending, and the covered part of each
+        (e,), in (0, 1]. For a shape this is its mean change in the element relative to that in its
+        middle."""
         centre = np.array([touch.x_mm, touch.y_mm])
         reach_mm = touch.radius_mm * (1.0 if touch.shape is None else touch.shape.reach)
         near = np.flatnonzero(
@@ -44,10 +46,10 @@ class Cover:
         return near[met], part[met]
 
     def factor(self, touches: Iterable[TrueTouch]) -> tuple[IntArray, FloatArray]:
-        """Elements (e,) that ``touches`` meet, ascending, and what each one's conductivity is
-        multiplied by (e,).
+        """Return the elements (e,) that ``touches`` meet, ascending, and the factor of each one's
+        conductivity (e,).
 
-        Where touches share an element their changes add (never below a thousandth).
+        If touches share an element, their changes add; the factor is at least a thousandth.
         """
         change = np.zeros(len(self._middles))
         for touch in touches:

@@ -1,8 +1,8 @@
-"""A sheet that is deformed evenly, with its electrodes, while its volume stays.
+"""A skin that is deformed evenly together with its electrodes, at constant volume.
 
-Touches, truth and pictures stay in the flat skin's coordinates: they move with the material. The
-forward problem is solved on the deformed mesh. A gel's resistivity is that of its salt water and
-does not change (Keplinger et al., Science 341, 2013); its lengths and thickness do.
+Touches, truth and pictures stay in the coordinates of the flat skin: they move with the material.
+The forward problem is solved on the deformed mesh. The resistivity of a gel is that of its salt
+water and does not change (Keplinger et al., Science 341, 2013); its lengths and thickness do.
 """
 
 from collections.abc import Iterable
@@ -18,7 +18,8 @@ from eitskin.fem.mesh import Mesh
 
 @dataclass(frozen=True)
 class Deformation:
-    """A place (x, y) comes to (xx x + xy y, yx x + yy y); the volume is kept."""
+    """An even deformation: a place (x, y) moves to (xx x + xy y, yx x + yy y), and the volume is
+    kept."""
 
     xx: float = 1.0
     xy: float = 0.0
@@ -27,12 +28,12 @@ class Deformation:
 
     @property
     def matrix(self) -> FloatArray:
-        """As (2, 2), to multiply a column (x, y) by."""
+        """The matrix (2, 2) that multiplies a column (x, y)."""
         return np.array([[self.xx, self.xy], [self.yx, self.yy]])
 
     @property
     def thickness(self) -> float:
-        """The thickness, relative to the flat sheet's."""
+        """The thickness relative to that of the flat skin."""
         return 1 / (self.xx * self.yy - self.xy * self.yx)
 
 
@@ -40,7 +41,7 @@ FLAT = Deformation()
 
 
 def one_after_another(steps: Iterable[Deformation]) -> Deformation:
-    """All of ``steps``, the first first."""
+    """Return the result of all ``steps``, applied in their order."""
     whole = np.eye(2)
     for step in steps:
         whole = step.matrix @ whole
@@ -48,15 +49,16 @@ def one_after_another(steps: Iterable[Deformation]) -> Deformation:
 
 
 def stretched(along: float, across: float, direction_deg: float) -> Deformation:
-    """Lengths times ``along`` in a direction and times ``across`` at right angles to it."""
+    """Return the deformation that multiplies lengths by ``along`` in a direction, and by ``across``
+    at right angles to it."""
     c, s = cos(radians(direction_deg)), sin(radians(direction_deg))
     slant = (along - across) * c * s
     return Deformation(along * c * c + across * s * s, slant, slant, along * s * s + across * c * c)
 
 
 def deformed(model: ForwardModel, how: Deformation) -> ForwardModel:
-    """``model`` on the deformed mesh; conductivities are then multiplied by ``how.thickness``, and
-    contact impedances divided by it."""
+    """Return ``model`` on the deformed mesh. The caller must multiply conductivities by
+    ``how.thickness`` and divide contact impedances by it."""
     mesh = model.mesh
     moved = Mesh(mesh.nodes_mm @ how.matrix.T, mesh.triangles, mesh.electrode_edges)
     other = ForwardModel(moved, model.skin, model.protocol)

@@ -1,8 +1,8 @@
-"""A scene: what happens on a skin, and which imperfections take part. Read from TOML, checked
-whole.
+"""A scene: what happens on a skin, and with which imperfections it is measured. It is read from
+TOML and checked completely.
 
-Effects' tables are kept as they are; the compiler reads them when it imports their modules. The
-schema: docs/guide/scenes.md.
+The tables of effects are kept as they are; the compiler reads them when it imports the effects'
+modules. docs/guide/scenes.md describes the format.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,34 +41,35 @@ TOUCH_KEYS = {"law", "radius_mm", "hold", "path", "x_mm", "y_mm", "from_s", "to_
 TOUCH_KEYS |= {"shape", "aspect", "angle_deg"}
 SCAN_KEYS = ("frozen", "row_us")
 SOLVERS = ("auto", "factorise", "update")
-ROW_US = 100.0  # from row to row on the board with its default settings
+ROW_US = 100.0  # time from row to row on a board with its default settings
 MAX_FRAMES = 1_000_000
 MAX_TIME_S = 1e7
-# another mesh than models are built on by default (about 3,000 elements): a simulation must not
-# share its errors with the solver
+# The mesh differs from the one of models (about 3,000 elements by default), so that a simulation
+# does not share its errors with the solver.
 DEFAULT_ELEMENTS = 5000
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What happens on a skin.
+    """The description of what happens on a skin.
 
     Attributes:
         name, description: a word and a line.
         skin, protocol: what is touched and how it is scanned.
-        seed: of all that is random.
-        frames: recorded frames, the first at 0 s; ``rate_hz`` a second.
-        quiet_frames: reference frames before them, at negative times, without touches.
-        elements: of the mesh, about.
+        seed: the seed of everything random.
+        frames: the number of recorded frames, the first at 0 s; ``rate_hz`` per second.
+        quiet_frames: the number of untouched reference frames before them, at negative times.
+        elements: the approximate number of elements of the mesh.
         solver: "factorise" again for each conductivity, "update" the untouched skin's factors, or
-            "auto": whichever counts cheaper where touches move, "factorise" where they do not.
-        touches: in the order of [[touch]].
-        frozen: each frame is a snapshot of its time; otherwise touches move while it is scanned.
-        row_us: from row to row of a scan; None is 100, or less where the frames follow faster.
-        effects: name to its table, as in TOML.
+            "auto", which is the cheaper one if touches move and "factorise" if they do not.
+        touches: the touches, in the order of [[touch]].
+        frozen: whether each frame is a snapshot at its time; otherwise touches move during its
+            scan.
+        row_us: the time from row to row of a scan; None is 100, or less if frames follow faster.
+        effects: the table of each effect by its name, as in TOML.
         where: the file, for errors.
         dataset: the table [dataset], as in TOML.
-        text: the TOML that it was read from.
+        text: the TOML that the scene was read from.
 
     Raises:
         ConfigError: a number is out of range, or a touch lies outside the skin, overlaps another or
@@ -114,16 +115,16 @@ class Scene:
 
     @property
     def n_frames(self) -> int:
-        """All frames, quiet ones included."""
+        """The number of all frames, untouched ones included."""
         return self.quiet_frames + self.frames
 
     def times_s(self) -> FloatArray:
-        """The recorded frames' times (frames,), at which their scans begin."""
+        """Return the times of the recorded frames (frames,), at which their scans begin."""
         return np.asarray(np.arange(self.frames) / self.rate_hz)
 
     @property
     def scan_s(self) -> float:
-        """From the beginning of a scan to its end."""
+        """The duration of a scan."""
         rows = self.protocol.n_rows
         if self.row_us is not None:
             return 1e-6 * self.row_us * rows
@@ -131,32 +132,33 @@ class Scene:
 
     @property
     def row_delays_s(self) -> FloatArray:
-        """Each row's instant (m,) after the beginning of the scan; 0 where ``frozen``."""
+        """When each row (m,) is measured after the beginning of the scan; 0 if ``frozen``."""
         row_s = 0.0 if self.frozen else self.scan_s / self.protocol.n_rows
         return np.asarray(row_s * self.protocol.scan_places)
 
     @property
     def truth_delay_s(self) -> float:
-        """When, after its time, a frame's truth was so: at the end of its scan, or at its time
-        where ``frozen``."""
+        """The delay from a frame's time to the instant that its truth describes: the end of its
+        scan, or 0 if ``frozen``."""
         return 0.0 if self.frozen else self.scan_s
 
     def samples(self, frames: range | None = None) -> tuple[TrackSamples, ...]:
-        """Each track when the truth of the recorded frames, or of ``frames`` of them, was so."""
+        """Return the samples of each track at the instants of the truth of the recorded frames, or
+        of ``frames`` among them."""
         times = self.times_s() if frames is None else np.asarray(frames) / self.rate_hz
         return self.samples_at(times + self.truth_delay_s)
 
     def samples_at(self, times_s: FloatArray) -> tuple[TrackSamples, ...]:
-        """Each track at any instants (k,)."""
+        """Return the samples of each track at any instants (k,)."""
         return tuple(sample(track, times_s) for track in self.touches)
 
 
 def load_scene(path: str | Path) -> Scene:
-    """The scene in the TOML file ``path``.
+    """Read the scene in the TOML file ``path``.
 
     Raises:
-        FileError: it, or the skin that it names, cannot be read.
-        ConfigError, GeometryError, ProtocolError: what it describes cannot be.
+        FileError: the file, or the skin that it names, cannot be read.
+        ConfigError, GeometryError, ProtocolError: the description is not valid.
     """
     path = Path(path)
     table = load_toml(path, "scene")
@@ -164,8 +166,8 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: str = "") -> Scene:
-    """The scene in a parsed TOML ``table``; ``where`` names it in errors, and skins are looked for
-    in ``folder``.
+    """Return the scene in a parsed TOML ``table``; ``where`` names it in errors, and files of skins
+    are searched in ``folder``.
 
     Raises:
         FileError, ConfigError, GeometryError, ProtocolError: as ``load_scene``.
@@ -260,7 +262,8 @@ def _track(table: Mapping[str, Any], where: str) -> TouchTrack:
 
 
 def _shape(table: Mapping[str, Any], where: str) -> "TouchShape | None":
-    """What ``shape`` names; its module is imported for shapes other than a disc."""
+    """Return the shape that ``shape`` names; its module is imported only for shapes other than a
+    disc."""
     name = table.get("shape", "disc")
     if name == "disc":
         for key in ("aspect", "angle_deg"):
@@ -283,7 +286,8 @@ def _defaults(table: Mapping[str, Any], driving: str) -> dict[str, Any]:
 def _standing(
     table: Mapping[str, Any], driving: str, where: str
 ) -> tuple[tuple[Keyframe, ...], bool]:
-    """A touch without a path: there from from_s to to_s, or always."""
+    """Return the keyframes of a touch without a path, which exists from from_s to to_s or always,
+    and whether it stays."""
     start = ALWAYS_S[0]
     if "from_s" in table:
         start = number(table, "from_s", 0.0, where, low=-MAX_TIME_S, high=MAX_TIME_S)
@@ -308,8 +312,8 @@ def _keyframe(table: Mapping[str, Any], driving: str, where: str) -> Keyframe:
 
 
 def _check_touches(scene: Scene) -> None:
-    """Refuse touches outside the skin, without size, or overlapping, in any recorded frame: when
-    its scan begins and ends, and at keyframes in it."""
+    """Reject touches that lie outside the skin, have no size or overlap in any recorded frame: when
+    its scan begins and ends, and at keyframes during it."""
     for k, track in enumerate(scene.touches):
         where = f"{scene.where} [[touch]] {k} (from 0)"
         if not track.keyframes:
@@ -318,7 +322,7 @@ def _check_touches(scene: Scene) -> None:
             raise ConfigError(f"{where}: radius_mm must be above 0; a touch needs a size")
         if not track.law.contrast_at(np.array([key.drive for key in track.keyframes])).min() > 0:
             raise ConfigError(
-                f"{where}: contrast must be above 0; a negative conductivity cannot be"
+                f"{where}: contrast must be above 0; a conductivity cannot be negative"
             )
     times = _scanned_s(scene)
     samples = scene.samples_at(times)
@@ -339,7 +343,7 @@ def _check_touches(scene: Scene) -> None:
 
 
 def _scanned_s(scene: Scene) -> FloatArray:
-    """Instants at which touches that go in straight lines are looked at."""
+    """Return the instants at which touches, which move in straight lines, are checked."""
     times = scene.times_s()
     if scene.frozen:
         return times
@@ -350,7 +354,7 @@ def _scanned_s(scene: Scene) -> FloatArray:
 
 
 def _room_mm(outline: Outline, one: TrackSamples, at: IntArray) -> FloatArray:
-    """How far inside the rim the touch's edge is in the frames ``at`` (k,): (k,)."""
+    """Return how far inside the rim the edge of the touch is in the frames ``at`` (k,), (k,)."""
     places = np.column_stack([one.x_mm[at], one.y_mm[at]])
     shape = one.shape
     if shape is None:
@@ -360,8 +364,8 @@ def _room_mm(outline: Outline, one: TrackSamples, at: IntArray) -> FloatArray:
 
 
 def _gap_mm(one: TrackSamples, other: TrackSamples) -> FloatArray:
-    """The distance between the edges of two touches, (n,), below 0 where they overlap; of shapes
-    about, but with the right sign."""
+    """Return the distance between the edges of two touches, (n,), below 0 if they overlap. For
+    shapes it is approximate, but its sign is right."""
     x_mm, y_mm = other.x_mm - one.x_mm, other.y_mm - one.y_mm
     away_mm = np.hypot(x_mm, y_mm)
     if one.shape is None and other.shape is None:

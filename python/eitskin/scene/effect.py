@@ -1,29 +1,28 @@
-"""What an effect is: the contract between the compiler of scenes and the modules that each hold one
-effect.
+"""The contract between the compiler of scenes and the modules that each implement one effect.
 
 An effect is a module. It is imported only when a scene names it, and defines
 
-- ``NAME``: the word in ``[effects.NAME]``; ``STAGE``: a :class:`Stage`; ``SUMMARY``: one line.
+- ``NAME``, the word in ``[effects.NAME]``; ``STAGE``, a :class:`Stage`; ``SUMMARY``, one line.
 - ``ORDER``: a number; within a stage, steps run by (ORDER, NAME). Leave gaps: 10, 20, 30.
-- ``Parameters``: a frozen dataclass, one field a key, units in the names. ``field(default=...,
+- ``Parameters``: a frozen dataclass, one field per key, units in names. ``field(default=...,
   metadata={"low": ..., "high": ..., "open_low": True, "choices": (...), "unit": "V", "doc":
   "..."})``; types are float, int, bool, str, tuple[int, ...], tuple[float, ...], or one of these
   ``| None``. Its ``__post_init__`` may raise ConfigError with one line that begins with the key;
   file and table are put before it.
 - ``make(parameters, session) -> Step``: it may raise ConfigError in the same way.
 - optionally ``CONFLICTS``: names of effects that it cannot be named together with, and ``SHARED``:
-  a dict from its keys to what they say of the instrument ({"frequency_hz": "excitation
-  frequency"}), on which named effects must agree.
+  a dict from its keys to the property of the instrument that each states ({"frequency_hz":
+  "excitation frequency"}), on which named effects must agree.
 
-Times: ``time_s`` is in seconds from the first recorded frame, on the same axis as the touches'
-    keyframes, so that it is
-NEGATIVE during the quiet frames. ``frame`` counts all frames from 0, quiet ones first.
+``time_s`` counts seconds from the first recorded frame, on the same axis as the touches' keyframes,
+so it is NEGATIVE during the untouched frames. ``frame`` counts all frames from 0, untouched ones
+first.
 
 A step's ``apply`` is a pure function of its arguments: the same frame gives the same result however
-often and in whatever order it is called, and it leaves its arguments as they are. What is random
-per frame is drawn from ``session.stream(NAME, frame)``, made again for that frame; what is random
-once is drawn in ``make`` from ``session.stream(NAME)`` (index 0) or ``session.stream(NAME + "
-part")``. Several parts: several names.
+often and in whatever order it is called, and the arguments stay unchanged. Values that are random
+in each frame are drawn from ``session.stream(NAME, frame)``, which is made again for that frame;
+values that are random once are drawn in ``make`` from ``session.stream(NAME)`` (index 0) or
+``session.stream(NAME + " part")``, with a different name for each part.
 """
 
 from collections.abc import Callable, Iterable
@@ -48,21 +47,22 @@ Voltages: TypeAlias = AnyArray
 
 
 class Stage(IntEnum):
-    """Where in the line from the sheet to the number a step stands; steps run in this order."""
+    """The place of a step on the way from the skin to the recorded number; steps run in this
+    order."""
 
-    GEOMETRY = 0  # where the electrodes truly are: once, before meshing
-    MATERIAL = 1  # conductivity of the sheet, per element, by time
-    BOUNDARY = 2  # contacts: impedance per electrode, which electrodes are detached or bridged
+    GEOMETRY = 0  # the true places of electrodes, once, before meshing
+    MATERIAL = 1  # conductivity of each element over time
+    BOUNDARY = 2  # contacts: impedance of each electrode, detached and bridged electrodes
     EXCITATION = 3  # the current: phase (complex solve), source output impedance, amplitude drift
-    FRONT_END = 4  # from true boundary voltages to the amplifier's output
-    DIGITISE = 5  # from there to codes: noise, saturation, ADC bits, jitter; always real numbers
+    FRONT_END = 4  # changes the true boundary voltages to the output of the amplifier
+    DIGITISE = 5  # changes that to codes: noise, saturation, ADC bits, jitter; only real numbers
 
 
 @dataclass(frozen=True)
 class EffectCost:
-    """What a step adds, once a session and once a frame.
+    """The work that a step adds, per session and per frame.
 
-    A vector pass reads or writes a vector of all voltages, elements or electrodes once.
+    A vector pass is one read or write of a vector of all voltages, elements or electrodes.
     """
 
     factorisations: float = 0
@@ -75,18 +75,18 @@ class EffectCost:
 
 @dataclass(frozen=True, eq=False)
 class EffectSession:
-    """What an effect's ``make`` is given.
+    """The session that an effect's ``make`` receives.
 
     Attributes:
-        skin: as described, before any geometry step.
-        protocol: the scan; m rows.
-        n_frames: all frames, quiet ones included.
-        quiet_frames: how many of them are quiet, at the start.
+        skin: the skin as described, before any geometry step.
+        protocol: the scan, with m rows.
+        n_frames: the number of all frames, untouched ones included.
+        quiet_frames: the number of untouched frames, at the start.
         rate_hz: frames per second.
-        seed: the scene's.
-        build_mesh: use ``mesh``.
-        solve_v0: use ``v0_v``.
-        make_stream: use ``stream``.
+        seed: the seed of the scene.
+        build_mesh: use ``mesh`` instead.
+        solve_v0: use ``v0_v`` instead.
+        make_stream: use ``stream`` instead.
     """
 
     skin: Skin
@@ -101,39 +101,42 @@ class EffectSession:
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh that is solved on, made when first asked for (not to be asked for by geometry
-        effects)."""
+        """The mesh that is solved on, made on first use. Geometry effects must not use it."""
         return self.build_mesh()
 
     def times_s(self) -> FloatArray:
-        """Each frame's time (n_frames,), below 0 for quiet ones."""
+        """Return the time of each frame (n_frames,), below 0 for untouched ones."""
         return np.asarray((np.arange(self.n_frames) - self.quiet_frames) / self.rate_hz)
 
     def v0_v(self) -> FloatArray:
-        """The exact frame (m,) of the untouched skin as described, with ideal electrodes and no
-        effect at all.
+        """Return the exact frame (m,) of the untouched skin as described, with ideal electrodes and
+        without any effect.
 
-        It does not depend on which effects are named, so that a signal-to-noise ratio means the
-        same volts always.
+        It does not depend on which effects are named, so a signal-to-noise ratio always refers to
+        the same voltages.
         """
         return self.solve_v0()
 
     def v0_rms_v(self) -> float:
-        """The root mean square of ``v0_v`` over its rows: SNR_dB = 20 log10(v0_rms_v / sigma)."""
+        """Return the root mean square of ``v0_v`` over its rows: SNR_dB = 20 log10(v0_rms_v /
+        sigma)."""
         return float(np.sqrt(np.mean(self.v0_v() ** 2)))
 
     def stream(self, name: str, index: int = 0) -> np.random.Generator:
-        """A generator keyed by (seed, ``name``, ``index``); ``name`` begins with the effect's."""
+        """Return the random generator for (seed, ``name``, ``index``); ``name`` begins with that of
+        the effect."""
         return self.make_stream(name, index)
 
     def limit_v(self, given_v: float | None, headroom: float | None) -> float:
-        """A limit in V: as given, or ``headroom`` (None: 1.25) times the largest of ``v0_v``."""
+        """Return a limit in V: ``given_v``, or ``headroom`` (None: 1.25) times the largest of
+        ``v0_v``."""
         if given_v is not None:
             return given_v
         return (1.25 if headroom is None else headroom) * float(np.abs(self.v0_v()).max())
 
     def refuse_absent(self, electrodes: Iterable[int]) -> None:
-        """Refuse electrodes that the skin has not, as those of a key ``electrodes``."""
+        """Raise a ConfigError for electrodes that the skin does not have, in a key called
+        ``electrodes``."""
         count = self.skin.electrodes.count
         for electrode in electrodes:
             if not 0 <= electrode < count:
@@ -143,8 +146,8 @@ class EffectSession:
 
 
 def part_at(time_s: float, at_s: float, rise_s: float) -> float:
-    """The part of a change after the tare that has happened at ``time_s``: 0 before ``at_s``, then
-    in proportion to time until it is whole ``rise_s`` later (0: at once)."""
+    """Return the part of a change after the tare that has happened at ``time_s``. It is 0 before
+    ``at_s``, then grows linearly and is complete ``rise_s`` later (0: at once)."""
     if time_s < at_s:
         return 0.0
     return 1.0 if rise_s <= 0 else min(1.0, (time_s - at_s) / rise_s)
@@ -152,11 +155,11 @@ def part_at(time_s: float, at_s: float, rise_s: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """The electrodes' contacts at one time.
+    """The contacts of the electrodes at one time.
 
-    ``impedance_ohm_m2`` (L,) is 0 for an ideal shunt. ``detached`` (L,) marks electrodes that touch
-    the sheet nowhere (open circuit; a badly touching one is a large impedance instead). ``bridges``
-    are resistors (i, j, ohm >= 0) between electrodes.
+    ``impedance_ohm_m2`` (L,) is 0 for an ideal shunt. ``detached`` (L,) marks electrodes that do
+    not touch the skin at all (open circuit; a bad contact is a large impedance instead).
+    ``bridges`` are resistors (i, j, ohm >= 0) between electrodes.
     """
 
     impedance_ohm_m2: FloatArray
@@ -166,11 +169,11 @@ class Contacts:
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """Potentials of the four electrodes of each row while it is read, (m,) V, against the mean of
-    all electrodes.
+    """The potentials of the four electrodes of each row while it is read, (m,) in V, relative to
+    the mean of all electrodes.
 
     The load of row r is (``source_v[r]`` - ``sink_v[r]``) / ``current_a`` in ohm, contacts
-    included. Complex after a phase step.
+    included. Values are complex after a phase step.
     """
 
     source_v: Voltages
@@ -182,7 +185,7 @@ class Loads:
 
 @dataclass(frozen=True, eq=False)
 class GeometryStep:
-    """``apply(skin) -> skin``: what is meshed. Once."""
+    """``apply(skin) -> skin`` gives the skin that is meshed; it runs once."""
 
     name: str
     cost: EffectCost
@@ -193,9 +196,9 @@ class GeometryStep:
 
 @dataclass(frozen=True, eq=False)
 class MaterialStep:
-    """``apply(conductivity (E,) S/m, time_s, frame) -> (E,)``, before touches; applied once unless
-    it ``varies``. ``same(time_s, frame)``: frames for which it gives the same number share a solve;
-    without it each frame that varies has its own."""
+    """``apply(conductivity (E,) S/m, time_s, frame) -> (E,)`` changes the conductivity before
+    touches are added. It runs once unless it ``varies``. Frames with equal ``same(time_s, frame)``
+    share a solve; without ``same`` each frame has its own."""
 
     name: str
     cost: EffectCost
@@ -208,8 +211,8 @@ class MaterialStep:
 
 @dataclass(frozen=True, eq=False)
 class DeformationStep:
-    """``apply(time_s, frame) -> Deformation`` of sheet and electrodes, one upon another. Frames
-    that are deformed alike share a solve."""
+    """``apply(time_s, frame) -> Deformation`` deforms skin and electrodes; several steps are
+    applied in turn. Frames with equal deformations share a solve."""
 
     name: str
     cost: EffectCost
@@ -221,7 +224,8 @@ class DeformationStep:
 
 @dataclass(frozen=True, eq=False)
 class ContactStep:
-    """``apply(contacts, time_s, frame) -> Contacts``; applied once unless it ``varies``."""
+    """``apply(contacts, time_s, frame) -> Contacts`` changes the contacts. It runs once unless it
+    ``varies``."""
 
     name: str
     cost: EffectCost
@@ -235,9 +239,9 @@ class ContactStep:
 class PhaseStep:
     """Makes the forward solve complex, at ``frequency_hz``.
 
-    ``admittivity(conductivity (E,) S/m) -> (E,) complex S/m``, element by element;
-    ``contact(impedance (L,) ohm m2) -> (L,) complex ohm m2``, in which 0 is an ideal shunt;
-    ``readout(v (m,) complex) -> (m,) float``, taken just before the digitising stage.
+    ``admittivity(conductivity (E,) S/m) -> (E,) complex S/m`` works element by element.
+    ``contact(impedance (L,) ohm m2) -> (L,) complex ohm m2`` keeps 0 as an ideal shunt. ``readout(v
+    (m,) complex) -> (m,) float`` runs just before the digitising stage.
     """
 
     name: str
@@ -252,8 +256,8 @@ class PhaseStep:
 
 @dataclass(frozen=True, eq=False)
 class LoadedStep:
-    """``apply(v (m,), loads, time_s, frame) -> (m,)``: uses electrode potentials (source impedance,
-    common mode)."""
+    """``apply(v (m,), loads, time_s, frame) -> (m,)`` changes the voltages and uses the electrodes'
+    potentials (for source impedance or common mode)."""
 
     name: str
     stage: Stage
@@ -264,8 +268,8 @@ class LoadedStep:
 
 @dataclass(frozen=True, eq=False)
 class VoltageStep:
-    """``apply(v (m,), time_s, frame) -> (m,)``. Rows are in the order of the scan, evenly over the
-    frame's time."""
+    """``apply(v (m,), time_s, frame) -> (m,)`` changes the voltages. Rows are in the order of the
+    scan, at equal intervals over the frame's time."""
 
     name: str
     stage: Stage
@@ -287,7 +291,7 @@ Step: TypeAlias = (
 
 @runtime_checkable
 class EffectModule(Protocol):
-    """What a module with an effect defines; ``CONFLICTS`` and ``SHARED`` may be left out."""
+    """The names that a module with an effect defines; ``CONFLICTS`` and ``SHARED`` are optional."""
 
     NAME: str
     STAGE: Stage
@@ -296,5 +300,5 @@ class EffectModule(Protocol):
     Parameters: type[Any]
 
     def make(self, parameters: Any, session: EffectSession) -> Step:
-        """The effect's step in this session."""
+        """Return the step of the effect in this session."""
         ...

@@ -1,15 +1,15 @@
-"""The forward solve of a scene: from conductivity and contacts to the electrodes' potentials, in
-one of two ways.
+"""The forward solve of a scene, from conductivity and contacts to the potentials of the electrodes,
+by one of two methods.
 
-``Factorise`` solves each distinct state by a factorisation of its own, exactly as ``ForwardModel``
-does. ``Update`` factorises the untouched skin once; a touch changes the matrix K on the few
-unknowns T under it, and with G = (K^-1)_TT and D the change on T (Woodbury)
+``Factorise`` solves each distinct state by its own factorisation, exactly as ``ForwardModel`` does.
+``Update`` factorises the untouched skin once. A touch changes the matrix K only on the few unknowns
+T under it; with G = (K^-1)_TT and the change D on T (Woodbury)
 
     (K + P D P')^-1 = K^-1 - K^-1 P D (1 + G D)^-1 P' K^-1 .
 
-A column of K^-1 is solved when its unknown is first touched and kept, so a touch that moves pays
-for the unknowns it newly reaches. Which of the two is cheaper is decided by counting
-multiplications (``count_costs``).
+A column of K^-1 is solved when its unknown is first touched, and kept, so a moving touch pays only
+for the unknowns that it newly reaches. The cheaper method is found by counting multiplications
+(``count_costs``).
 """
 
 from dataclasses import dataclass
@@ -21,15 +21,15 @@ from eitskin.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from eitskin.fem.cem import ForwardModel, System, factorise
 from eitskin.scene.effect import PhaseStep
 
-# Ordering and symbolic analysis, in multiplications per stored value of the matrix. Measured with
-# SuperLU at 3,000 and 10,000 elements: a factorisation takes as long as 50 to 80 solves, although
-# it multiplies only as much as 13 to 28.
+# The cost of ordering and symbolic analysis, in multiplications per stored value of the matrix.
+# Measured with SuperLU at 3,000 and 10,000 elements: a factorisation takes as long as 50 to 80
+# solves, although it needs only the multiplications of 13 to 28.
 SYMBOLIC_PER_VALUE = 200
 
 
 @dataclass
 class Work:
-    """What a forward solve has done."""
+    """The work of a forward solve so far."""
 
     factorisations: int = 0
     complex_factorisations: int = 0
@@ -39,24 +39,26 @@ class Work:
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Elements (e,) whose conductivity a state multiplies by ``factor`` (e,): the touches."""
+    """The elements (e,) whose conductivity the touches of a state multiply by ``factor`` (e,)."""
 
     elements: IntArray
     factor: FloatArray
 
 
 class Forward(Protocol):
-    """Electrode potentials (L, P) in V per A of each pattern of the model, zero mean."""
+    """Calculates the potentials of the electrodes (L, P) in V per A for each pattern of the model,
+    with zero mean."""
 
     def electrodes(
         self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray
     ) -> AnyArray:
-        """For a sheet ``background`` (E,) S/m with a ``change``, and contacts (L,)."""
+        """Return the potentials for a skin with conductivity ``background`` (E,) in S/m, a
+        ``change``, and contact impedances (L,)."""
         ...
 
 
 def touched(background: FloatArray, change: Change) -> FloatArray:
-    """The conductivity (E,) with the touches in it."""
+    """Return the conductivity (E,) including the touches."""
     conductivity = background.copy()
     conductivity[change.elements] *= change.factor
     return conductivity
@@ -64,7 +66,7 @@ def touched(background: FloatArray, change: Change) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Factorise:
-    """A factorisation for each call, by ``ForwardModel`` itself."""
+    """Solves by one factorisation per call, with ``ForwardModel`` itself."""
 
     model: ForwardModel
     work: Work
@@ -72,7 +74,7 @@ class Factorise:
     def electrodes(
         self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray
     ) -> AnyArray:
-        """As :class:`Forward`."""
+        """Return the potentials, as in :class:`Forward`."""
         before = self.model.counters.solves
         solution = self.model.solve(touched(background, change), impedance_ohm_m2)
         self.work.factorisations += 1
@@ -82,8 +84,8 @@ class Factorise:
 
 @dataclass(frozen=True, eq=False)
 class FactoriseComplex:
-    """A complex factorisation for each call: admittivity and interface impedance from the scene's
-    phase step."""
+    """Solves by one complex factorisation per call, with admittivity and interface impedance from
+    the phase step of the scene."""
 
     model: ForwardModel
     phase: PhaseStep
@@ -92,27 +94,27 @@ class FactoriseComplex:
     def electrodes(
         self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray
     ) -> AnyArray:
-        """As :class:`Forward`, complex."""
+        """Return the complex potentials, as in :class:`Forward`."""
         impedance = self.phase.contact(impedance_ohm_m2)
         system = self.model.system_for(np.asarray(impedance == 0))
         admittivity = self.phase.admittivity(touched(background, change))
         factors = factorise(system.matrix(admittivity, impedance))
-        loads = _loads(self.model, system).astype(np.complex128)
+        currents = _right_hand_sides(self.model, system).astype(np.complex128)
         self.work.complex_factorisations += 1
         self.work.factorisations += 1
-        self.work.solves += loads.shape[1]
-        solved = np.zeros((system.size + 1, loads.shape[1]), np.complex128)
-        solved[: system.size] = factors.solve(loads)
+        self.work.solves += currents.shape[1]
+        solved = np.zeros((system.size + 1, currents.shape[1]), np.complex128)
+        solved[: system.size] = factors.solve(currents)
         return _zero_mean(solved[system.unknown[self.model.mesh.n_nodes :]])
 
 
 class Update:
-    """One factorisation of the untouched skin, then a low-rank update for each call; background and
-    contacts stay.
+    """Solves by one factorisation of the untouched skin and a low-rank update per call; background
+    and contacts must stay the same.
 
     ``reach`` (u,) are all unknowns that a state is known to touch (``touched_unknowns``), so that
-    storage is known beforehand; a state that touches others costs the columns again.
-    ``base_factors`` are those of the untouched skin's matrix, where they are known.
+    storage is known beforehand; a state that touches others makes all columns be solved again.
+    ``base_factors`` are the factors of the untouched skin's matrix, if known.
     """
 
     def __init__(
@@ -130,8 +132,8 @@ class Update:
     def electrodes(
         self, background: FloatArray, change: Change, impedance_ohm_m2: FloatArray
     ) -> AnyArray:
-        """As :class:`Forward`; ``background`` and ``impedance_ohm_m2`` must be those of the first
-        call."""
+        """Return the potentials, as in :class:`Forward`; ``background`` and ``impedance_ohm_m2``
+        must be those of the first call."""
         if not self._ready:
             self._factorise_base(background, impedance_ohm_m2)
         if not len(change.elements):
@@ -173,39 +175,40 @@ class Update:
         self._ready = True
 
     def _solve_base(self) -> None:
-        """The untouched skin's potentials on what is reached, and no column."""
+        """Solve for the untouched skin's potentials on the reached unknowns, and forget all
+        columns."""
         model, system = self.model, self._system
         electrodes = system.unknown[model.mesh.n_nodes :]
         self._kept = np.concatenate([self.reach, np.minimum(electrodes, system.size - 1)])
         self._grounded = electrodes == system.size
-        loads = _loads(model, system)
-        base = np.column_stack([self._column(loads[:, k]) for k in range(loads.shape[1])])
+        currents = _right_hand_sides(model, system)
+        base = np.column_stack([self._column(currents[:, k]) for k in range(currents.shape[1])])
         self._base_touched, self._base_electrodes = base[: len(self.reach)], base[len(self.reach) :]
         self._columns = np.zeros((len(self.reach), len(self._kept)), self._dtype)
         self._known = np.zeros(len(self.reach), np.bool_)
 
-    def _column(self, load: AnyArray) -> AnyArray:
-        """One solve, kept on the unknowns that matter. One at a time: the same bits whatever is
-        solved beside it."""
+    def _column(self, right_side: AnyArray) -> AnyArray:
+        """Solve one right-hand side and keep the result on the unknowns that matter. Solving one at
+        a time gives the same bits, whichever others are solved."""
         self.work.solves += 1
-        kept = self._factors.solve(np.ascontiguousarray(load, dtype=self._dtype))[self._kept]
+        kept = self._factors.solve(np.ascontiguousarray(right_side, self._dtype))[self._kept]
         kept[len(self.reach) :][self._grounded] = 0
         return np.asarray(kept)
 
     def _solve_columns(self, unknowns: IntArray) -> None:
         for place in np.searchsorted(self.reach, unknowns):
             if not self._known[place]:
-                load = np.zeros(self._system.size)
-                load[self.reach[place]] = 1.0
-                self._columns[place] = self._column(load)
+                unit = np.zeros(self._system.size)
+                unit[self.reach[place]] = 1.0
+                self._columns[place] = self._column(unit)
                 self._known[place] = True
 
 
-def _loads(model: ForwardModel, system: System) -> FloatArray:
+def _right_hand_sides(model: ForwardModel, system: System) -> FloatArray:
     currents = model.patterns.right_hand_sides(len(system.shunted))
-    loads = np.zeros((system.size + 1, currents.shape[1]))
-    loads[system.unknown[model.mesh.n_nodes :]] = currents
-    return loads[: system.size]
+    sides = np.zeros((system.size + 1, currents.shape[1]))
+    sides[system.unknown[model.mesh.n_nodes :]] = currents
+    return sides[: system.size]
 
 
 def _zero_mean(electrodes: AnyArray) -> AnyArray:
@@ -215,8 +218,8 @@ def _zero_mean(electrodes: AnyArray) -> AnyArray:
 def _dense_change(
     model: ForwardModel, system: System, stiffness: FloatArray, elements: IntArray, values: AnyArray
 ) -> tuple[IntArray, AnyArray]:
-    """The unknowns under ``elements`` (k,), ascending, and the change of the matrix on them (k,
-    k)."""
+    """Return the unknowns (k,) under ``elements``, ascending, and the change of the matrix on them
+    (k, k)."""
     places = system.unknown[model.mesh.triangles[elements]]
     unknowns, local = np.unique(places, return_inverse=True)
     local = local.reshape(places.shape)
@@ -227,7 +230,7 @@ def _dense_change(
 
 
 def touched_unknowns(model: ForwardModel, shunted: BoolArray, elements: IntArray) -> IntArray:
-    """The unknowns (k,) at the corners of ``elements`` (e,), ascending, without the grounded
+    """Return the unknowns (k,) at the corners of ``elements`` (e,), ascending, without the grounded
     one."""
     system = model.system_for(shunted)
     unknowns = np.unique(system.unknown[model.mesh.triangles[elements]])
@@ -236,8 +239,8 @@ def touched_unknowns(model: ForwardModel, shunted: BoolArray, elements: IntArray
 
 @dataclass(frozen=True)
 class UpdateCost:
-    """Multiplications that each way would take for a whole session, and the solves of the
-    update."""
+    """The multiplications that each method would need for the whole session, and the number of
+    solves of the update."""
 
     factorise: float
     update: float
@@ -245,16 +248,16 @@ class UpdateCost:
 
     @property
     def cheaper(self) -> str:
-        """The name of the way with fewer."""
+        """The name of the method with fewer multiplications."""
         return "update" if self.update < self.factorise else "factorise"
 
 
 def count_costs(model: ForwardModel, shunted: BoolArray, ranks: IntArray, reach: int) -> UpdateCost:
-    """Count both ways for states that touch ``ranks`` (s,) unknowns each, ``reach`` different ones
-    together.
+    """Count the multiplications of both methods for states that touch ``ranks`` (s,) unknowns each,
+    and ``reach`` different ones together.
 
-    Fill is estimated as for nested dissection in the plane: a factor of n unknowns holds about 1.5
-    n log2(n) values and takes about 10 n^1.5 multiplications (counted: 23,358 and 0.60 M at n =
+    Fill-in is estimated as for nested dissection in the plane: a factor of n unknowns holds about
+    1.5 n log2(n) values and takes about 10 n^1.5 multiplications (counted: 23,358 and 0.60 M at n =
     1,482; 146,328 and 8.4 M at n = 5,452).
     """
     system = model.system_for(shunted)

@@ -1,23 +1,23 @@
-"""From a touch to the conductivity under it: by contact with a conductor, or by load on a
-piezoresistive sheet.
+"""The law of a touch: the conductivity under it, from contact with a conductor or from force on a
+piezoresistive skin.
 
-A law gives the contrast, the conductivity under the touch divided by the sheet's.
+A law gives the contrast, which is the conductivity under the touch divided by that of the skin.
 
-- Short circuit: a conductor lies on the sheet and carries current beside it. With full contact
-  (``press`` = 1) the two together conduct ``contrast`` times what the sheet does; less contact
-  carries less: 1 + press (contrast - 1). A finger (about 0.09 S/m) on the paper's gel (0.01 S/m)
-  gives about 9.
-- Piezoresistive: load brings the conductive paths of the sheet together. The paper finds the
-  response nearly linear from 50 to 200 g, and it saturates beyond: 1 + c (1 - exp(-s grams / c))
-  with c = saturation_contrast - 1 and s the slope at no load, ``sensitivity_per_gram``. The slope
-  that the paper sees fall towards the centre is one of the picture's peak, not of the conductivity,
-  and so is no part of the law.
-- Press and conduct: both, as of a finger that is pressed on. Of two rough bodies the true contact
-  grows with the load at first (Greenwood and Williamson, Proc. R. Soc. A 295, 1966) and ends at the
-  whole, so that to the piezoresistive contrast (contrast - 1) (1 - exp(-grams / contact_grams)) is
-  added.
-- Insulating: what is pressed on pushes the sheet aside or parts it, as a plastic rod does in a
-  tank. The short circuit's formula with a contrast below 1.
+- Short circuit: a conductor lies on the skin and carries current in parallel. With full contact
+  (``press`` = 1) both together conduct ``contrast`` times as well as the skin alone; with less
+  contact the contrast is 1 + press (contrast - 1). A finger (about 0.09 S/m) on the paper's gel
+  (0.01 S/m) gives about 9.
+- Piezoresistive: force brings the conductive paths of the skin together. The paper finds a nearly
+  linear response from 50 to 200 g, and saturation beyond: 1 + c (1 - exp(-s grams / c)) with
+  c = saturation_contrast - 1 and the slope s at zero force, ``sensitivity_per_gram``. The paper
+  also finds that the slope falls towards the centre; that is a property of the image's peak, not
+  of the conductivity, so it is not part of the law.
+- Press and conduct: both effects, as for a finger that presses. The true contact area of two rough
+  bodies first grows with the force (Greenwood and Williamson, Proc. R. Soc. A 295, 1966) and ends
+  at full contact, so (contrast - 1) (1 - exp(-grams / contact_grams)) is added to the
+  piezoresistive contrast.
+- Insulating: the body displaces or divides the skin, as a plastic rod does in a tank. The formula
+  is that of the short circuit with a contrast below 1.
 """
 
 from collections.abc import Mapping
@@ -35,47 +35,47 @@ MAX_CONTRAST = 1e4
 
 @dataclass(frozen=True)
 class ShortCircuit:
-    """Contact with a conductor, driven by ``press``: its part of full contact, 0 to 1. A contrast
-    below 1 insulates."""
+    """Contact with a conductor; ``press`` is the part of full contact, 0 to 1. A contrast below 1
+    insulates."""
 
     contrast: float = 9.0
 
     def contrast_at(self, press: FloatArray) -> FloatArray:
-        """Contrast for each ``press``, the same shape."""
+        """Return the contrast for each ``press``, in the same shape."""
         return np.asarray(1.0 + press * (self.contrast - 1.0))
 
 
 @dataclass(frozen=True)
 class Piezoresistive:
-    """Load on the sheet; driven by ``grams``. ``sensitivity_per_gram`` is the slope of the contrast
-    at no load."""
+    """Force on the skin, in ``grams``. ``sensitivity_per_gram`` is the slope of the contrast at
+    zero force."""
 
     sensitivity_per_gram: float = 0.02
     saturation_contrast: float = 10.0
 
     def contrast_at(self, grams: FloatArray) -> FloatArray:
-        """Contrast for each load in ``grams``, the same shape."""
+        """Return the contrast for each force in ``grams``, in the same shape."""
         most = self.saturation_contrast - 1.0
         return np.asarray(1.0 + most * -np.expm1(-self.sensitivity_per_gram * grams / most))
 
 
 @dataclass(frozen=True)
 class PressAndConduct(Piezoresistive):
-    """A conductor that is pressed on: load on the sheet, and current through the contact, of which
-    ``contact_grams`` make 63 %. Driven by ``grams``."""
+    """A conductor that is pressed onto the skin with ``grams``: force on the skin, and current
+    through the contact, which reaches 63 % of full contact at ``contact_grams``."""
 
     contrast: float = 9.0
     contact_grams: float = 50.0
 
     def contrast_at(self, grams: FloatArray) -> FloatArray:
-        """Contrast for each load in ``grams``, the same shape."""
+        """Return the contrast for each force in ``grams``, in the same shape."""
         contact = -np.expm1(-grams / self.contact_grams)
         return np.asarray(super().contrast_at(grams) + (self.contrast - 1.0) * contact)
 
 
 @dataclass(frozen=True)
 class Insulating(ShortCircuit):
-    """A body that does not conduct, pressed into the sheet; driven by ``press``, 0 to 1."""
+    """A body that does not conduct, pressed into the skin; ``press`` is 0 to 1."""
 
     contrast: float = 0.2
 
@@ -92,7 +92,7 @@ LAW_KEYS = {name: tuple(one.name for one in fields(kind)) for name, kind in KIND
 DRIVING_KEY = {
     name: "press" if issubclass(kind, ShortCircuit) else "grams" for name, kind in KINDS.items()
 }
-LEAST = {"saturation_contrast": 1.0}  # exclusive; others 0
+LEAST = {"saturation_contrast": 1.0}  # exclusive limit; 0 for all others
 MOST = {
     "sensitivity_per_gram": 10.0,
     "saturation_contrast": 1e4,
@@ -102,8 +102,12 @@ MOST = {
 
 
 def law_from_table(table: Mapping[str, Any], name: str, where: str) -> Law:
-    """The law called ``name`` with its parameters in ``table``; other keys of the table are not
-    looked at."""
+    """Return the law called ``name`` with its parameters in ``table``; keys that belong to no law
+    are ignored.
+
+    Raises:
+        ConfigError: a parameter is out of range or belongs to another law.
+    """
     own = (*LAW_KEYS[name], DRIVING_KEY[name])
     for other, keys in LAW_KEYS.items():
         for key in (*keys, DRIVING_KEY[other]):
@@ -114,6 +118,6 @@ def law_from_table(table: Mapping[str, Any], name: str, where: str) -> Law:
     kind, given = KINDS[name], {}
     for key in LAW_KEYS[name]:
         low, high = LEAST.get(key, 0), 1.0 if kind is Insulating else MOST[key]
-        usual = getattr(kind(), key)
-        given[key] = number(table, key, usual, where, low=low, high=high, open_low=True)
+        default = getattr(kind(), key)
+        given[key] = number(table, key, default, where, low=low, high=high, open_low=True)
     return kind(**given)

@@ -1,4 +1,4 @@
-"""The scenes that come with the package, found by name."""
+"""The scenes that ship with the package, found by name."""
 
 from importlib.resources import files
 from pathlib import Path
@@ -9,13 +9,13 @@ from eitskin.scene.description import Scene, load_scene
 
 
 def library() -> dict[str, Path]:
-    """Each library scene's name and its file, by name."""
+    """Return the file of each library scene by its name."""
     folder = Path(str(files("eitskin.scene"))) / "library"
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
 def descriptions() -> dict[str, str]:
-    """Each library scene's name and its line."""
+    """Return the description of each library scene by its name."""
     return {
         name: str(load_toml(path, "scene")["scene"]["description"])
         for name, path in library().items()
@@ -23,7 +23,11 @@ def descriptions() -> dict[str, str]:
 
 
 def scene_path(name: str) -> Path:
-    """The file of ``name``: a path as given, or a library scene with or without ".toml"."""
+    """Return the file of ``name``: a path as given, or a library scene with or without ".toml".
+
+    Raises:
+        FileError: there is no such scene.
+    """
     path, known = Path(name), library()
     if path.exists():
         return path
@@ -37,5 +41,6 @@ def scene_path(name: str) -> Path:
 
 
 def find_scene(name: str) -> Scene:
-    """The scene ``name``: a file, or one of the library."""
+    """Return the scene ``name``: a file, or one of the library. Errors are those of ``scene_path``
+    and ``load_scene``."""
     return load_scene(scene_path(name))

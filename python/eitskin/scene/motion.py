@@ -1,11 +1,13 @@
-"""Touches while a scan runs: few states that are solved, and between which two each row lies.
+"""Touches that move during a scan: a few states are solved, and each row is interpolated between
+two of them.
 
-Between two keyframes of any touch every touch goes in a straight line; such a stretch is a leg. How
-much a leg changes is the sum over its touches of the way, in steps of ``STEP_MM``, of the change of
-the radius, in steps of ``STEP_RADIUS_MM``, and of that of (contrast - 1) / (contrast + 1), to which
-a disc's voltages are nearly proportional, in steps of ``STEP_CONTRAST``. States lie evenly in it,
-at most a step apart, and a row's voltage is interpolated in it between the two states around its
-instant. Where nothing changes there is one state, and nothing is interpolated.
+Between two keyframes of any touch every touch moves in a straight line; such a stretch of time is a
+leg. The change during a leg is a sum over its touches: the length of the path in steps of
+``STEP_MM``, the change of the radius in steps of ``STEP_RADIUS_MM``, and the change of (contrast -
+1) / (contrast + 1), to which a disc's voltages are nearly proportional, in steps of
+``STEP_CONTRAST``. States are placed evenly over this change, at most a step apart, and a row's
+voltage is interpolated over it between the two states around its instant. If nothing changes, there
+is one state, and nothing is interpolated.
 """
 
 from collections.abc import Sequence
@@ -20,16 +22,16 @@ from eitskin.scene.touch_path import sample as sample_track
 
 Touches = tuple[TrueTouch, ...]
 
-STEP_MM = 1.0  # of a touch's way, on a skin as wide as the paper's
+STEP_MM = 1.0  # of a touch's path, on a skin of the paper's size
 STEP_RADIUS_MM = 0.5
 STEP_CONTRAST = 0.1
-SAME_S = 1e-9  # instants as near as this are one
-FINE = 256  # pieces of a leg in which the instants of its states are looked for
+SAME_S = 1e-9  # instants closer than this count as equal
+FINE = 256  # pieces per step of a leg in which the instants of its states are searched
 
 
 @dataclass(frozen=True, eq=False)
 class Mix:
-    """Instants (k,) between two states each: v = v[lower] + part (v[upper] - v[lower])."""
+    """Instants (k,), each between two states: v = v[lower] + part (v[upper] - v[lower])."""
 
     lower: IntArray
     upper: IntArray
@@ -37,15 +39,15 @@ class Mix:
 
     @property
     def still(self) -> bool:
-        """Whether all instants have one state."""
+        """Return whether all instants have the same state."""
         first = self.lower[0]
         return bool((self.lower == first).all() and (self.upper == first).all())
 
 
 @dataclass(frozen=True, eq=False)
 class _Leg:
-    """``numbers`` of the touches that are there; the instants (n,) of its states, and how much has
-    changed until each."""
+    """One leg: the ``numbers`` of its touches, the instants (n,) of its states, and the change up
+    to each of them."""
 
     numbers: tuple[int, ...]
     start_s: float
@@ -55,8 +57,9 @@ class _Leg:
 
 
 class Motion:
-    """The touches of ``tracks`` at any instant, as states and what lies between; states are
-    numbered as they are first asked for. ``size``: the skin's over the paper's."""
+    """The touches of ``tracks`` at any instant, as states and the mixes between them. States are
+    numbered in the order in which they are first asked for. ``size`` is that of the skin over the
+    paper's."""
 
     def __init__(self, tracks: Sequence[TouchTrack], size: float = 1.0) -> None:
         self._tracks, self._size = tuple(tracks), size
@@ -68,11 +71,11 @@ class Motion:
         self.states: list[Touches] = []
 
     def touches_at(self, time_s: float) -> Touches:
-        """What is there at ``time_s``."""
+        """Return the touches at ``time_s``."""
         return touches_of(self._tracks, time_s)
 
     def at(self, times_s: FloatArray) -> Mix:
-        """Between which states the instants (k,), ascending or not, lie."""
+        """Return the states between which the instants (k,) lie; the instants need not ascend."""
         lower = np.empty(len(times_s), np.int64)
         upper, part = lower.copy(), np.zeros(len(times_s))
         legs = np.searchsorted(self._breaks, times_s)
@@ -102,7 +105,7 @@ class Motion:
         return lower, np.array([used[int(k) + 1] for k in below]), np.asarray(part.clip(0, 1))
 
     def _leg(self, number: int) -> _Leg:
-        """The leg before break ``number``; the last one is after all."""
+        """Return the leg before break ``number``; the last leg comes after all breaks."""
         if number not in self._legs:
             self._legs[number] = self._make_leg(number)
         return self._legs[number]
@@ -137,7 +140,7 @@ class Motion:
     def _changed(
         self, numbers: Sequence[int], start_s: float, end_s: float, times_s: FloatArray
     ) -> FloatArray:
-        """How much has changed since the leg began, in steps, at each instant (k,)."""
+        """Return the change since the start of the leg, in steps, at each instant (k,)."""
         total = np.zeros(len(times_s))
         for number in numbers:
             track = self._tracks[number]
@@ -168,5 +171,6 @@ class Motion:
 
 
 def _signal(contrast: FloatArray) -> FloatArray:
-    """What a disc's voltages are nearly proportional to: that of a disc in an endless sheet."""
+    """Return the quantity to which a disc's voltages are nearly proportional: the response of a
+    disc in an infinite sheet."""
     return np.asarray((contrast - 1.0) / (contrast + 1.0))

@@ -1,5 +1,4 @@
-"""What a compiled scene will do, as lines to read: the steps in their order and what each will
-cost."""
+"""The plan of a compiled scene, as text: its steps in order, and the cost of each."""
 
 from __future__ import annotations
 
@@ -26,7 +25,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PlanStep:
-    """One step: ``effect`` says whether the scene names it or every scene has it."""
+    """One step; ``effect`` tells whether it comes from an effect of the scene or is part of every
+    scene."""
 
     name: str
     stage: Stage
@@ -37,10 +37,11 @@ class PlanStep:
 
 @dataclass(frozen=True)
 class ScenePlan:
-    """All steps of a scene in the order they run, and what the whole session will cost.
+    """All steps of a scene in order, and the cost of the whole session.
 
-    ``factorisations`` and ``solves`` are of recorded and quiet frames, and of the reference V0
-    where an effect asks for it; ``states`` are the distinct states of sheet, touches and contacts.
+    ``factorisations`` and ``solves`` cover recorded and untouched frames, and the reference V0 if
+    an effect asks for it. ``states`` is the number of distinct states of skin, touches and
+    contacts.
     """
 
     scene: str
@@ -56,6 +57,7 @@ class ScenePlan:
     method: str
 
     def as_dict(self) -> dict[str, Any]:
+        """Return the plan as JSON values."""
         return {
             "scene": self.scene,
             "steps": [
@@ -66,7 +68,7 @@ class ScenePlan:
         }
 
     def text(self) -> str:
-        """As a table."""
+        """Return the plan as a table."""
         costs = [cost_text(step.cost) for step in self.steps]
         wide = max(len(cost) for cost in costs)
         lines = [
@@ -97,7 +99,7 @@ class ScenePlan:
 
 
 def cost_text(cost: EffectCost) -> str:
-    """A cost in words; what is 0 is left out."""
+    """Return a cost in words, without entries of 0."""
     parts = [
         (cost.factorisations, "factorisations"),
         (cost.factorisations_per_frame, "factorisations/frame"),
@@ -121,9 +123,9 @@ def make_plan(
     factorised: bool = False,
     moving: int = 0,
 ) -> ScenePlan:
-    """The plan of a compiled scene: the steps that every scene has, with those of the named effects
-    in their places. ``factorised``: the untouched skin is already, for V0; ``moving``: frames in
-    which touches change while they are scanned."""
+    """Return the plan of a compiled scene: the steps of every scene with those of the named effects
+    in their places. ``factorised`` tells that the untouched skin is already factorised, for V0;
+    ``moving`` is the number of frames during which touches change."""
     own = [PlanStep(step.name, step.stage, step.note, step.cost, True) for step in steps]
     kinds = dict(zip(own, steps, strict=True))
     patterns, total = len(model.patterns.solved), scene.n_frames
@@ -150,7 +152,7 @@ def make_plan(
     touches = []
     if scene.touches:
         changing = sum(track.moves for track in scene.touches)
-        note_touches = f"{len(scene.touches)}, of which {changing} change while they are there"
+        note_touches = f"{len(scene.touches)}, of which {changing} change over time"
         shapes = {track.shape.profile for track in scene.touches if track.shape is not None}
         if shapes:
             note_touches += f"; shapes: {', '.join(sorted(shapes))}"

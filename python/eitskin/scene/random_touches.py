@@ -1,7 +1,7 @@
-"""Random touches: seeded sets of scenes for judging reconstructions, and rings of a given spacing
+"""Random touches: seeded sets of scenes for judging reconstructions, and rings with a given spacing
 for counting.
 
-A scene depends on (seed, role, its number) only: the first 20 scenes of a set of 180 are the set of
+A scene depends only on (seed, role, its number): the first 20 scenes of a set of 180 are the set of
 20, and the training set of a seed is independent of its test set.
 """
 
@@ -29,14 +29,14 @@ TRIES = 20_000
 
 @dataclass(frozen=True)
 class TrueTouch:
-    """A disc of another conductivity, or another shape.
+    """A disc, or another shape, of different conductivity.
 
     Attributes:
-        x_mm, y_mm: its centre.
-        radius_mm: its radius; of another shape that of the disc of equal area.
-        contrast: conductivity inside (of another shape in the middle) / the sheet's; above 1
-            conductive, below 1 resistive.
-        shape: None is an even disc.
+        x_mm, y_mm: the centre.
+        radius_mm: the radius; for another shape, that of the disc of equal area.
+        contrast: the conductivity inside (for another shape, in the middle) over that of the skin;
+            above 1 conductive, below 1 resistive.
+        shape: the shape; None is an even disc.
     """
 
     x_mm: float
@@ -46,13 +46,13 @@ class TrueTouch:
     shape: "TouchShape | None" = None
 
     def covers(self, x_mm: FloatArray, y_mm: FloatArray) -> BoolArray:
-        """Whether places so far from its centre, (...), lie in it."""
+        """Return whether places at these distances from the centre, (...), lie inside."""
         if self.shape is None:
             return np.asarray(x_mm**2 + y_mm**2 <= self.radius_mm**2)
         return np.asarray(self.shape.rho2(x_mm, y_mm, self.radius_mm) <= 1)
 
     def rim_mm(self) -> FloatArray:
-        """Points (64, 2) of its edge."""
+        """Return points (64, 2) on the edge."""
         if self.shape is not None:
             return np.asarray(self.shape.rim_mm(self.radius_mm) + np.array([self.x_mm, self.y_mm]))
         turn = np.linspace(0, 2 * np.pi, 64, endpoint=False)
@@ -62,21 +62,22 @@ class TrueTouch:
 
 @dataclass(frozen=True)
 class TouchScene:
-    """Touches that are there at one time; ``name`` says set and number."""
+    """Touches that exist at the same time; ``name`` states the set and the number."""
 
     name: str
     touches: tuple[TrueTouch, ...]
 
     def centres_mm(self) -> FloatArray:
-        """(k, 2)."""
+        """Return the centres, (k, 2)."""
         return np.array([(t.x_mm, t.y_mm) for t in self.touches], dtype=np.float64).reshape(-1, 2)
 
     def radii_mm(self) -> FloatArray:
-        """(k,)."""
+        """Return the radii, (k,)."""
         return np.array([t.radius_mm for t in self.touches], dtype=np.float64)
 
     def mask(self, points_mm: FloatArray) -> BoolArray:
-        """Which of ``points_mm`` (p, 2) lie in any touch (a Gaussian's: within half height)."""
+        """Return which of ``points_mm`` (p, 2) lie in any touch; a Gaussian touch counts within
+        half its height."""
         inside = np.zeros(len(points_mm), dtype=np.bool_)
         along_x, along_y = np.ascontiguousarray(points_mm.T)
         for touch in self.touches:
@@ -86,17 +87,18 @@ class TouchScene:
 
 @dataclass(frozen=True)
 class TouchRules:
-    """How touches are drawn: each range uniformly, the place uniformly over the skin.
+    """The rules by which touches are drawn: uniformly within each range, and uniformly over the
+    skin.
 
     Attributes:
-        count: least and most touches of a scene.
+        count: least and greatest number of touches in a scene.
         radius_mm: range of the radius.
         contrast: range of the contrast.
         gap_mm: least distance between the edges of two touches. 12 mm is two pixels of a 32-pixel
-            image of the 194 mm skin: nearer touches are one even in a perfect image.
-        rim_margin_mm: least distance from a touch's edge to the rim.
-        shape: "disc", or one of ``touch_shape.SHAPES``; its angle is drawn too.
-        aspect: range of long over short axis; None: the shape's own.
+            image of the 194 mm skin; closer touches appear as one even in a perfect image.
+        rim_margin_mm: least distance from the edge of a touch to the rim.
+        shape: "disc", or one of ``touch_shape.SHAPES``, whose angle is drawn too.
+        aspect: range of the long over the short axis; None takes the shape's default.
     """
 
     count: tuple[int, int] = (1, 3)
@@ -132,7 +134,7 @@ class TouchRules:
 
 @dataclass(frozen=True)
 class TouchSet:
-    """Scenes drawn under one seed and one role ("train", "test", ...)."""
+    """Scenes drawn with one seed and one role ("train", "test", ...)."""
 
     role: str
     seed: int
@@ -140,14 +142,14 @@ class TouchSet:
 
     @property
     def name(self) -> str:
-        """Role, seed and count: with the rules, all that is needed to draw the set again."""
+        """Role, seed and count; with the rules they suffice to draw the set again."""
         return f"{self.role}-s{self.seed}-n{len(self.scenes)}"
 
 
 def random_touches(
     outline: Outline, seed: int, count: int, role: str = "test", rules: TouchRules | None = None
 ) -> TouchSet:
-    """``count`` scenes of random touches.
+    """Return ``count`` scenes of random touches.
 
     Raises:
         UsageError: the count is below 1 or the seed below 0.
@@ -172,7 +174,7 @@ def random_touches(
 
 
 def rim_distance_mm(outline: Outline, points_mm: npt.ArrayLike) -> FloatArray:
-    """How far inside the rim each of ``points_mm`` (k, 2) is: (k,); below 0 outside."""
+    """Return how far inside the rim each of ``points_mm`` (k, 2) lies, (k,); below 0 outside."""
     points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
     if outline.diameter_mm is not None:
         return np.asarray(outline.diameter_mm / 2 - np.hypot(points[:, 0], points[:, 1]))
@@ -187,13 +189,13 @@ def rim_distance_mm(outline: Outline, points_mm: npt.ArrayLike) -> FloatArray:
 def _shapes(
     rules: TouchRules, number: int, shape_generator: Callable[[], np.random.Generator]
 ) -> "list[TouchShape | None]":
-    """The touches' shapes; of discs nothing is drawn."""
+    """Return the shapes of the touches; for discs no random number is drawn."""
     if rules.shape == "disc":
         return [None] * number
     from eitskin.scene.touch_shape import SHAPES, named_shape
 
-    generator, usual = shape_generator(), SHAPES[rules.shape][1]
-    aspects = generator.uniform(*(rules.aspect or (usual, usual)), size=number)
+    generator, default = shape_generator(), SHAPES[rules.shape][1]
+    aspects = generator.uniform(*(rules.aspect or (default, default)), size=number)
     angles = generator.uniform(0.0, 180.0, size=number)
     return [
         named_shape(rules.shape, float(a), float(deg))
@@ -207,8 +209,8 @@ def _draw(
     generator: np.random.Generator,
     shape_generator: Callable[[], np.random.Generator],
 ) -> tuple[TrueTouch, ...]:
-    """One scene: sizes first, then places until all fit; after 200 misses for one touch all places
-    are drawn again."""
+    """Draw one scene: sizes first, then places until all fit. After 200 misses for one touch all
+    places are drawn again."""
     number = int(generator.integers(rules.count[0], rules.count[1], endpoint=True))
     radii = generator.uniform(*rules.radius_mm, size=number)
     contrasts = generator.uniform(*rules.contrast, size=number)

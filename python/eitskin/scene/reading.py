@@ -1,7 +1,7 @@
-"""From the electrodes' potentials to the protocol's voltages: bridges, detached electrodes, and
-each row's loads.
+"""Compute the voltages of the protocol from the potentials of the electrodes, including bridges,
+detached electrodes and the load of each row.
 
-A skin seen from its electrodes is a linear network, so resistors between electrodes need no new
+Seen from its electrodes, a skin is a linear network, so resistors between electrodes need no new
 factorisation: with the potentials Z D of the bridges' own current patterns D and resistances R, U'
 = U - Z D (R + D' Z D)^-1 D' U.
 """
@@ -15,17 +15,18 @@ from eitskin.fem.patterns import Patterns
 from eitskin.scene.effect import Contacts, Loads
 from eitskin.skin.protocol import Protocol
 
-# A detached electrode's impedance in the solve. It carries no current as a whole, and 1e4 ohm m2
-# keeps what little runs in and out again along its width below 1e-8 of the other rows; one that a
-# bridge feeds has 2 Gohm on the paper's 48 mm2, where about 1e-5 leaks. More would cost the solve
-# as many digits.
+# The impedance of a detached electrode in the solve. Its net current is zero, and with 1e4 ohm m2
+# the current that enters and leaves along its width stays below 1e-8 of the other rows. An
+# electrode that a bridge feeds has 2 Gohm on the paper's 48 mm2, where about 1e-5 leaks. A greater
+# impedance would cost the solve as many digits.
 OPEN_OHM_M2 = 1e4
 OPEN_BRIDGED_OHM_M2 = 1e5
 
 
 @dataclass(frozen=True, eq=False)
 class TrueVoltages:
-    """One state's true boundary voltages (m,) and, where a step needs them, the rows' loads."""
+    """The true boundary voltages (m,) of one state and, if a step needs them, the loads of its
+    rows."""
 
     v: AnyArray
     loads: Loads | None = None
@@ -40,16 +41,16 @@ class PlainReader:
     current_a: float
 
     def read(self, electrodes: AnyArray, contacts: Contacts) -> TrueVoltages:
-        """From potentials (L, P) in V per A."""
+        """Return the voltages for potentials (L, P) in V per A."""
         return TrueVoltages(self.patterns.voltages(electrodes) * self.current_a)
 
 
 @dataclass(frozen=True, eq=False)
 class WholeReader:
-    """Also bridges, detached electrodes and loads.
+    """A reader that also handles bridges, detached electrodes and loads.
 
     ``patterns`` hold the protocol's patterns, then one for each of ``pairs`` (b, 2), the electrodes
-    that some state bridges. Rows that use an electrode without any way to the sheet read 0 V.
+    that any state bridges. Rows that use an electrode without a connection to the skin read 0 V.
     """
 
     patterns: Patterns
@@ -57,7 +58,7 @@ class WholeReader:
     pairs: tuple[tuple[int, int], ...]
 
     def read(self, electrodes: AnyArray, contacts: Contacts) -> TrueVoltages:
-        """From potentials (L, P + b) in V per A."""
+        """Return the voltages for potentials (L, P + b) in V per A."""
         potentials = electrodes @ self.patterns.mix.T
         if contacts.bridges:
             potentials = self._bridged(potentials, electrodes, contacts)
@@ -84,7 +85,8 @@ class WholeReader:
 
 
 def with_bridges(patterns: Patterns, pairs: tuple[tuple[int, int], ...]) -> Patterns:
-    """``patterns`` that also solve a unit current between the electrodes of each of ``pairs``."""
+    """Return ``patterns`` extended by a unit current between the electrodes of each of
+    ``pairs``."""
     if not pairs:
         return patterns
     mix = np.hstack([patterns.mix, np.zeros((len(patterns.mix), len(pairs)))])
@@ -94,8 +96,8 @@ def with_bridges(patterns: Patterns, pairs: tuple[tuple[int, int], ...]) -> Patt
 
 
 def live_rows(contacts: Contacts, rows: IntArray) -> BoolArray:
-    """Which ``rows`` (m, 4) use only electrodes that touch the sheet, or are bridged to one that
-    does: (m,)."""
+    """Return which ``rows`` (m, 4) use only electrodes that touch the skin or are bridged to one
+    that does, (m,)."""
     attached = ~contacts.detached
     for _ in range(len(contacts.bridges)):
         for i, j, _ohm in contacts.bridges:
@@ -104,7 +106,7 @@ def live_rows(contacts: Contacts, rows: IntArray) -> BoolArray:
 
 
 def solved_impedance(contacts: Contacts) -> FloatArray:
-    """The contact impedances (L,) that are solved with."""
+    """Return the contact impedances (L,) that the solve uses."""
     is_open = np.full(len(contacts.detached), OPEN_OHM_M2)
     is_open[[k for i, j, _ in contacts.bridges for k in (i, j)]] = OPEN_BRIDGED_OHM_M2
     return np.asarray(np.where(contacts.detached, is_open, contacts.impedance_ohm_m2))

@@ -1,9 +1,9 @@
-"""Which effects there are, and the import of those that a scene names.
+"""The list of effects, and the import of those that a scene names.
 
 Built-in effects are listed by name and module; a user's package adds its own by an entry point of
-the group ``eitskin.effects`` (name = module). A module is imported when a scene names its effect,
-and not before; listing effects reads their source without running it. A built-in name cannot be
-taken by an entry point.
+the group ``eitskin.effects`` (name = module). A module is imported only when a scene names its
+effect; listing effects reads their source without running it. An entry point cannot replace a
+built-in name.
 """
 
 import ast
@@ -56,20 +56,25 @@ BUILT_IN: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Registry:
-    """Names to modules: ``modules`` first, then, where ``entry_points``, those of installed
-    packages."""
+    """The module of each effect name: ``modules`` first, then, if ``entry_points`` is set, those of
+    installed packages."""
 
     modules: Mapping[str, str] = field(default_factory=lambda: dict(BUILT_IN))
     entry_points: bool = True
 
     def names(self) -> dict[str, str]:
-        """Every name and its module; nothing is imported."""
+        """Return the module of every name; nothing is imported."""
         points = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
         found = {one.name: one.value for one in points} if self.entry_points else {}
         return {**found, **self.modules}
 
     def load(self, name: str, where: str) -> EffectModule:
-        """Import the module of the effect ``name``; ``where`` names the scene in errors."""
+        """Import the module of the effect ``name``; ``where`` names the scene in errors.
+
+        Raises:
+            ConfigError: the effect is unknown, or its module cannot be imported or is not a valid
+                effect.
+        """
         target = self.modules.get(name) or self.names().get(name)
         if target is None:
             raise ConfigError(
@@ -89,7 +94,7 @@ def _check_contract(module: object, name: str, where: str) -> None:
     for attribute in ("NAME", "STAGE", "ORDER", "SUMMARY", "Parameters", "make"):
         if not hasattr(module, attribute):
             raise ConfigError(
-                f"{where}: its module defines no {attribute}; docs/guide/scenes.md says what an"
+                f"{where}: its module defines no {attribute}; docs/guide/scenes.md lists what an"
                 " effect defines"
             )
     if name != module.NAME or not isinstance(module.STAGE, Stage):  # type: ignore[attr-defined]
@@ -99,8 +104,8 @@ def _check_contract(module: object, name: str, where: str) -> None:
 
 
 def summary_of(target: str) -> str:
-    """The SUMMARY that the module ``target`` assigns, read from its source without importing it; ""
-    where unknown."""
+    """Return the SUMMARY that the module ``target`` assigns, read from its source without importing
+    it, or "" if unknown."""
     package, _, last = target.rpartition(".")
     try:
         if not package.startswith("eitskin."):
@@ -122,19 +127,19 @@ def summary_of(target: str) -> str:
 
 
 def describe_parameters(module: EffectModule) -> list[dict[str, Any]]:
-    """Each parameter's name, type, default, range, unit and meaning, for ``eitskin scene effects
-    NAME``."""
+    """Return name, type, default, range, unit and meaning of each parameter, for ``eitskin scene
+    effects NAME``."""
     hints = get_type_hints(module.Parameters)
     rows = []
     for one in fields(module.Parameters):
         default = one.default if one.default_factory is MISSING else one.default_factory()
-        kind, told = hints[one.name], ("low", "high", "choices", "unit", "doc")
+        kind, shown = hints[one.name], ("low", "high", "choices", "unit", "doc")
         rows.append(
             {
                 "name": one.name,
                 "type": kind.__name__ if isinstance(kind, type) else str(kind),
                 "default": "required" if default is MISSING else default,
-                **{key: one.metadata[key] for key in told if key in one.metadata},
+                **{key: one.metadata[key] for key in shown if key in one.metadata},
             }
         )
     return rows

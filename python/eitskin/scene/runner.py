@@ -1,5 +1,5 @@
-"""Running a compiled scene: every distinct state is solved once, every frame goes through the named
-steps."""
+"""Run a compiled scene: every distinct state is solved once, and every frame passes through the
+named steps."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -24,7 +24,7 @@ from eitskin.skin.skin import skin_to_table
 
 @dataclass(frozen=True, eq=False)
 class SceneRun:
-    """What running gave: all frames (n, m) in V, quiet ones first, and the work it took.
+    """The result of a run: all frames (n, m) in V, untouched ones first, and the work that it took.
 
     ``true_v`` (s, m) are the states' voltages before excitation, front end and converter.
     """
@@ -37,7 +37,7 @@ class SceneRun:
 
 
 def forward_of(compiled: Compiled, work: Work) -> Forward:
-    """The forward step that was chosen when compiling."""
+    """Return the forward step that was chosen when compiling."""
     if compiled.method == "update":
         return Update(compiled.model, compiled.phase, compiled.reach, work, compiled.base_factors)
     if compiled.phase is not None:
@@ -46,8 +46,8 @@ def forward_of(compiled: Compiled, work: Work) -> Forward:
 
 
 class FrameMaker:
-    """The frames of a compiled scene, each made when it is asked for; a state is solved when a
-    frame first needs it. The same values in whatever order."""
+    """Makes each frame of a compiled scene when it is asked for; a state is solved when a frame
+    first needs it. The values do not depend on the order of requests."""
 
     def __init__(self, compiled: Compiled) -> None:
         self.compiled, self.work = compiled, Work()
@@ -60,7 +60,7 @@ class FrameMaker:
         self._still: tuple[tuple[int, int], FloatArray] = ((-1, -1), np.zeros(0))
 
     def reading(self, number: int) -> TrueVoltages:
-        """State ``number``'s voltages before excitation, front end and converter."""
+        """Return the voltages of state ``number`` before excitation, front end and converter."""
         if number not in self._readings:
             state = self.compiled.table.all[number]
             forward, thickness = self._forward, state.deformation.thickness
@@ -75,15 +75,16 @@ class FrameMaker:
         return self._readings[number]
 
     def _deformed(self, how: Deformation) -> Forward:
-        """The forward step of a deformed skin; the last one is kept."""
+        """Return the forward step of a deformed skin; the last one is kept."""
         if self._last is None or self._last[0] != how:
             model = deformed(self.compiled.model, how)
             self._last = how, forward_of(replace(self.compiled, model=model), self.work)
         return self._last[1]
 
     def frame(self, frame: int, row_times_s: FloatArray | None = None) -> FloatArray:
-        """Frame number ``frame`` of all frames, quiet ones first: (m,) in V. Its rows are those of
-        its scan, or of the instants ``row_times_s`` (m,); its effects are the frame's."""
+        """Return frame number ``frame`` of all frames, untouched ones first, (m,) in V. Its rows
+        are those of its own scan, or those at the instants ``row_times_s`` (m,); effects are those
+        of the frame."""
         mix = None if row_times_s is None else self.compiled.table.mix(frame, row_times_s)
         if mix is None or not mix.still:
             return self._made(frame, self._true(frame, mix))
@@ -93,7 +94,8 @@ class FrameMaker:
         return self._still[1]
 
     def _made(self, frame: int, reading: TrueVoltages) -> FloatArray:
-        """A frame of true voltages, through what stands between them and the recorded ones."""
+        """Return the recorded frame for true voltages: they pass through the front end and the
+        converter."""
         scene, place = self.compiled.scene, frame - self.compiled.frames.start
         v, time_s = reading.v, float(self._times[place])
         for function in self.compiled.functions:
@@ -116,7 +118,7 @@ class FrameMaker:
 
 
 def blend(readings: dict[int, TrueVoltages], mix: Mix) -> TrueVoltages:
-    """Each row's voltage, and loads, between those of its two states."""
+    """Interpolate the voltages and loads of each row between those of its two states."""
     numbers = sorted(readings)
     upper = np.where(mix.part > 0, mix.upper, mix.lower)
     low, high = (np.searchsorted(numbers, one) for one in (mix.lower, upper))
@@ -140,8 +142,8 @@ def blend(readings: dict[int, TrueVoltages], mix: Mix) -> TrueVoltages:
 
 
 def simulate_frames(compiled: Compiled, progress: Progress = silent) -> SceneRun:
-    """Solve every state, then take every frame through the steps; ``progress`` wraps the states'
-    numbers."""
+    """Solve every state, then pass every frame through the steps; ``progress`` wraps the numbers of
+    the states."""
     scene, maker = compiled.scene, FrameMaker(compiled)
     states = compiled.states
     unknown = [k for k in range(len(states)) if k not in compiled.known]
@@ -173,11 +175,12 @@ def run(
     truth_pixels: int = 64,
     progress: Progress = silent,
 ) -> Frames:
-    """The scene's frames with their truth, rastered with ``truth_pixels`` along the skin's longer
-    side (0: no rasters).
+    """Return the frames of the scene with their truth, rastered with ``truth_pixels`` along the
+    skin's longer side (0: no rasters).
 
-    ``meta`` says how they were made: the scene's text, its plan, its effects' parameters, and the
-    work counted."""
+    ``meta`` describes how they were made: the text of the scene, its plan, the parameters of its
+    effects, and the counted work.
+    """
     scene = compiled.scene
     truth = truth_of(compiled, truth_pixels)
     done = simulate_frames(compiled, progress)
@@ -193,12 +196,12 @@ def run(
 
 
 def run_scene(scene: Scene) -> Frames:
-    """The frames of ``scene`` with their truth."""
+    """Return the frames of ``scene`` with their truth."""
     return run(compile_scene(scene))
 
 
 def meta_of(compiled: Compiled, done: SceneRun) -> dict[str, Any]:
-    """How the frames were made, as JSON values."""
+    """Return how the frames were made, as JSON values."""
     scene = compiled.scene
     return {
         "made_by": f"eitskin {__version__}, scene {scene.name!r}",
@@ -222,7 +225,7 @@ def meta_of(compiled: Compiled, done: SceneRun) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """``value`` with tuples as lists and numpy numbers as Python's, fit for JSON."""
+    """Return ``value`` for JSON, with tuples as lists and numpy numbers as Python's."""
     if isinstance(value, dict):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):

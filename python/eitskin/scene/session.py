@@ -1,5 +1,5 @@
-"""A scene's session: its named effects imported and made, and the meshes and models that scenes
-share."""
+"""The session of a scene: its named effects imported and made, and the meshes and models that
+scenes share."""
 
 from copy import copy
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from eitskin.skin.skin import Skin
 
 
 class MeshCache:
-    """Meshes, models and untouched skins, kept between scenes of the same skin and protocol object
-    (dataset mode)."""
+    """Meshes, models and untouched skins that are kept for further scenes with the same skin and
+    the same protocol object (dataset mode)."""
 
     def __init__(self) -> None:
         self._meshes: dict[tuple[Skin, int], Mesh] = {}
@@ -31,7 +31,7 @@ class MeshCache:
         self._untouched: dict[tuple[Skin, int, Protocol], FloatArray] = {}
 
     def mesh(self, skin: Skin, elements: int) -> Mesh:
-        """The mesh of ``skin`` with about so many ``elements``."""
+        """Return the mesh of ``skin`` with about ``elements`` elements."""
         key = (skin, elements)
         if key not in self._meshes:
             self._meshes[key] = mesh_for_elements(skin, elements)
@@ -40,28 +40,28 @@ class MeshCache:
     def model(
         self, skin: Skin, protocol: Protocol, elements: int, contacts: FloatArray
     ) -> ForwardModel:
-        """A copy of a forward model of ``skin`` whose matrix has the pattern for ``contacts`` (L,),
-        by which are 0."""
+        """Return a copy of a forward model of ``skin`` whose matrix has the sparsity pattern for
+        ``contacts`` (L,), which depends on which are 0."""
         key = (skin, elements, protocol, (contacts == 0).tobytes())
         if key not in self._models:
             self._models[key] = ForwardModel(self.mesh(skin, elements), skin, protocol, contacts)
         return copy(self._models[key])
 
     def cover(self, skin: Skin, elements: int) -> Cover:
-        """Which elements of the mesh touches cover."""
+        """Return the cover, which finds the elements under touches."""
         key = (skin, elements)
         if key not in self._covers:
             self._covers[key] = Cover(self.mesh(skin, elements))
         return self._covers[key]
 
     def known(self, scene: Scene) -> FloatArray | None:
-        """The electrodes' potentials (L, P) of ``scene``'s untouched skin, where they were asked
-        for before."""
+        """Return the electrodes' potentials (L, P) of ``scene``'s untouched skin if they were
+        calculated before, or None."""
         return self._untouched.get((scene.skin, scene.elements, scene.protocol))
 
     def v0_v(self, scene: Scene, work: "SessionWork") -> FloatArray:
-        """The reference frame (m,) of ``scene``'s skin without any effect; a factorisation when
-        first asked for."""
+        """Return the reference frame (m,) of ``scene``'s skin without any effect; the first call
+        factorises."""
         model = self.model(
             scene.skin, scene.protocol, scene.elements, np.zeros(scene.skin.electrodes.count)
         )
@@ -77,8 +77,8 @@ class MeshCache:
 
 @dataclass
 class SessionWork:
-    """What making a session costs beside its forward solves: the reference V0, and random
-    generators. ``v0_factors`` are those of the untouched skin's matrix, where they were made."""
+    """The cost of making a session apart from its forward solves: the reference V0, and random
+    generators. ``v0_factors`` are those of the untouched skin's matrix, if they were made."""
 
     v0_factorisations: int = 0
     v0_solves: int = 0
@@ -87,7 +87,7 @@ class SessionWork:
 
 
 def load_effects(scene: Scene, registry: Registry) -> dict[str, EffectModule]:
-    """The named effects' modules in the order that they will run."""
+    """Return the modules of the named effects in the order in which they will run."""
     modules = {name: registry.load(name, scene.where) for name in scene.effects}
     for name, module in modules.items():
         for other in getattr(module, "CONFLICTS", ()):
@@ -102,13 +102,13 @@ def load_effects(scene: Scene, registry: Registry) -> dict[str, EffectModule]:
 def check_shared(
     scene: Scene, modules: dict[str, EffectModule], parameters: dict[str, Any]
 ) -> None:
-    """Refuse effects that say different things of what they share, such as the excitation's
-    frequency."""
-    said: dict[str, tuple[str, Any]] = {}
+    """Raise a ConfigError if effects state different values for something that they share, such as
+    the excitation frequency."""
+    stated: dict[str, tuple[str, Any]] = {}
     for name, module in modules.items():
         for key, meaning in getattr(module, "SHARED", {}).items():
             value = getattr(parameters[name], key)
-            other, before = said.setdefault(meaning, (f"[effects.{name}] {key}", value))
+            other, before = stated.setdefault(meaning, (f"[effects.{name}] {key}", value))
             if before != value:
                 raise ConfigError(
                     f"{scene.where} [effects.{name}]: {key} = {value!r} contradicts {other} ="
@@ -123,13 +123,13 @@ def make_steps(
     mesh_cache: MeshCache,
     work: SessionWork,
 ) -> tuple[tuple[Step, ...], Skin]:
-    """Every named effect's step, geometry first, and the skin as it truly is."""
+    """Return the step of every named effect, geometry first, and the true skin."""
     skin, in_geometry = scene.skin, True
 
     def build_mesh() -> Mesh:
         if in_geometry:
             raise ConfigError(
-                "an effect of the geometry comes before the mesh and cannot ask for it; repair the"
+                "a geometry effect runs before the mesh is made and cannot ask for it; repair the"
                 " effect"
             )
         return mesh_cache.mesh(skin, scene.elements)

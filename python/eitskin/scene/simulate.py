@@ -1,10 +1,9 @@
-"""Frames that touches would give: every scene solved nonlinearly on a fine mesh, then measured
+"""Simulate frames of touches: every scene is solved nonlinearly on a fine mesh, then measured
 imperfectly.
 
-The mesh is not the one that is reconstructed on, or the comparison would be rigged (an "inverse
-crime"). What is imperfect is named in :class:`Measurement`, and each source of it has its own
-random stream (``eitskin.scene.streams``): turning one off leaves the samples of the others as they
-were.
+The mesh differs from the one that images are reconstructed on; otherwise the comparison would be
+unfair (an "inverse crime"). :class:`Measurement` names the imperfections. Each has its own random
+stream (``eitskin.scene.streams``): turning one off does not change the samples of the others.
 """
 
 from collections.abc import Iterable
@@ -29,17 +28,17 @@ ELEMENTS = 11_000
 
 @dataclass(frozen=True)
 class Measurement:
-    """What stands between the voltages and the numbers; None or 0 turns a part off.
+    """The imperfections of the measurement; None or 0 turns one off.
 
     Attributes:
-        snr_db: 20 log10(rms(V0) / sigma) of white noise, sigma the same on every channel and V0 the
-            noise-free frame of the untouched skin, rms over its m channels.
+        snr_db: 20 log10(rms(V0) / sigma) of white noise. sigma is the same for every row, and V0 is
+            the noise-free frame of the untouched skin, rms over its m rows.
         adc_bits: resolution of the converter.
-        adc_headroom: the converter spans +- adc_headroom max|V0|; beyond that it clips.
+        adc_headroom: the converter spans +- adc_headroom max|V0|; values beyond are clipped.
         contact_spread: each electrode's contact impedance is the skin's times 1 + uniform(-s, s),
-            drawn once for quiet and touched frames.
-        quiet_frames: frames of the untouched skin; their mean is the reference, their scatter shows
-            the noise.
+            drawn once for untouched and touched frames.
+        quiet_frames: number of frames of the untouched skin; their mean is the reference, and their
+            scatter shows the noise.
     """
 
     snr_db: float | None = 60.0
@@ -62,19 +61,20 @@ class Measurement:
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """A session: one skin with its contacts, quiet frames, then one frame a scene; all in V.
+    """A session: one skin with its contacts, its untouched frames, then one frame per scene; all in
+    V.
 
     Attributes:
         skin, protocol, touches, measurement, seed: what was simulated; ``seed`` is that of contacts
             and noise.
-        frames_v: (k, m) measured, one a scene.
+        frames_v: (k, m) measured, one per scene.
         quiet_v: (q, m) measured without touches.
         exact_v: (k, m) the same scenes without noise and converter.
-        exact_quiet_v: (m,) the same of the untouched skin; rms(V0) refers to it.
+        exact_quiet_v: (m,) the untouched skin without noise and converter; rms(V0) refers to it.
         contact_impedance_ohm_m2: (L,) as drawn.
-        noise_v: sigma of the noise, 0 for none.
-        lsb_v: a step of the converter, 0 for none.
-        clipped: how many of the measured values met the converter's end.
+        noise_v: sigma of the noise, 0 without noise.
+        lsb_v: a step of the converter, 0 without a converter.
+        clipped: how many measured values were clipped by the converter.
         mesh_nodes, mesh_elements: size of the mesh that was solved on.
     """
 
@@ -96,15 +96,16 @@ class Simulated:
 
     @property
     def reference_v(self) -> FloatArray:
-        """The mean quiet frame (m,)."""
+        """The mean untouched frame (m,)."""
         return np.asarray(self.quiet_v.mean(axis=0))
 
     def differences_v(self) -> FloatArray:
-        """Touched frames minus the reference: (k, m)."""
+        """Return the touched frames minus the reference, (k, m)."""
         return self.frames_v - self.reference_v
 
     def as_frames(self) -> Frames:
-        """The session as frames with truth, to be saved or reconstructed like measured ones."""
+        """Return the session as frames with truth, which can be saved or reconstructed like
+        measured ones."""
         flat = [
             (k, touch) for k, scene in enumerate(self.touches.scenes) for touch in scene.touches
         ]
@@ -133,10 +134,11 @@ class Simulated:
 
 
 def conductivity_with(mesh: Mesh, touches: Iterable[TrueTouch], sheet_s_per_m: float) -> FloatArray:
-    """Conductivity (E,) in S/m of a sheet with touches: each element's mean over its area.
+    """Return the conductivity (E,) in S/m of a skin with touches: the mean over the area of each
+    element.
 
-    Touches are taken to lie apart; where they overlap, their changes add (never below a thousandth
-    of the sheet's).
+    Touches are assumed to lie apart; if they overlap, their changes add (at least a thousandth of
+    the skin's conductivity remains).
     """
     conductivity = np.full(mesh.n_elements, float(sheet_s_per_m))
     elements, factor = Cover(mesh).factor(touches)
@@ -158,12 +160,13 @@ def simulate(
 
     Args:
         skin, protocol: what is touched and scanned.
-        touches: one frame each.
-        measurement: imperfections; None takes the defaults.
-        seed: of contacts and noise; None takes that of ``touches``. Streams are named after its
-            role too, so that training and test sessions of a seed share nothing.
-        mesh: to solve on; None makes one of about 11,000 elements.
-        progress: wraps the scenes, to show how far it is.
+        touches: one frame per scene.
+        measurement: the imperfections; None takes the defaults.
+        seed: the seed of contacts and noise; None takes that of ``touches``. Streams also depend on
+            the role of ``touches``, so that training and test sessions with the same seed share
+            nothing.
+        mesh: the mesh to solve on; None makes one of about 11,000 elements.
+        progress: wraps the scenes, to show progress.
 
     Raises:
         UsageError, GeometryError, ProtocolError, MissingExtraError: from meshing and the forward
@@ -215,14 +218,14 @@ def simulate(
 def measure(
     exact_v: FloatArray, noise_v: float, lsb_v: float, span_v: float, seed: int, name: str
 ) -> tuple[FloatArray, int]:
-    """Noise, then the converter: measured frames and how many values clipped. Each frame has its
-    own stream.
+    """Add noise, then digitise: return the measured frames, and how many values clipped. Each frame
+    has its own stream.
 
     Args:
-        exact_v: (k, m) V.
-        noise_v, lsb_v, span_v: sigma of the noise, a step of the converter (0: none), half its
-            range; V.
-        seed, name: of the streams.
+        exact_v: (k, m) in V.
+        noise_v, lsb_v, span_v: sigma of the noise, a step of the converter (0: none), and half its
+            range, in V.
+        seed, name: those of the streams.
     """
     rows = [
         stream(seed, f"noise {name}", k).standard_normal(exact_v.shape[1])

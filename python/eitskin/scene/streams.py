@@ -1,5 +1,5 @@
-"""Random streams keyed by (seed, name): each source of randomness has its own, so that adding one
-changes no other."""
+"""Random streams keyed by (seed, name). Each source of randomness has its own, so adding one does
+not change the others."""
 
 import hashlib
 
@@ -9,11 +9,14 @@ from eitskin.errors import UsageError
 
 
 def stream(seed: int, name: str, index: int = 0) -> np.random.Generator:
-    """The generator of the source ``name`` under ``seed``; ``index`` counts its independent draws
-    (scenes, frames).
+    """Return the generator of the source ``name`` under ``seed``; ``index`` counts its independent
+    draws (scenes, frames).
 
-    The name enters by its SHA-256, so that streams do not depend on the order or number of other
+    The name enters by its SHA-256, so a stream does not depend on the order or number of other
     names.
+
+    Raises:
+        UsageError: the seed or the index is below 0.
     """
     if seed < 0 or index < 0:
         raise UsageError(f"a seed must be 0 or above, not {min(seed, index)}")

@@ -1,4 +1,4 @@
-"""Where a touch is at any time, and how hard: straight lines between keyframes."""
+"""The place and strength of a touch at any time: straight lines between keyframes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,8 +20,8 @@ ALWAYS_S = (float("-inf"), float("inf"))
 
 @dataclass(frozen=True)
 class Keyframe:
-    """A touch at ``t_s`` after the first recorded frame; ``drive`` is press (0 to 1) or grams, as
-    its law wants."""
+    """A touch at ``t_s`` after the first recorded frame; ``drive`` is press (0 to 1) or grams,
+    depending on its law."""
 
     t_s: float
     x_mm: float
@@ -32,11 +32,11 @@ class Keyframe:
 
 @dataclass(frozen=True)
 class TouchTrack:
-    """A touch that comes, moves, presses and lifts.
+    """A touch that appears, moves, presses and lifts.
 
-    It is there from its first keyframe to its last, both included; with ``hold`` it stays after the
-    last. A track of one keyframe at t_s = -inf is there always. Between keyframes everything
-    changes in proportion to time, but its ``shape`` (None: an even disc).
+    It exists from its first keyframe to its last, both included; with ``hold`` it stays after the
+    last. A track with a single keyframe at t_s = -inf always exists. Between keyframes everything
+    changes linearly with time, except its ``shape`` (None: an even disc).
     """
 
     keyframes: tuple[Keyframe, ...]
@@ -46,16 +46,15 @@ class TouchTrack:
 
     @property
     def moves(self) -> bool:
-        """Whether place, size or load change while it is there."""
+        """Return whether its place, size or force changes."""
         return len({(k.x_mm, k.y_mm, k.radius_mm, k.drive) for k in self.keyframes}) > 1
 
 
 @dataclass(frozen=True, eq=False)
 class TrackSamples:
-    """One track at given times, all (n,). Where it is not ``there``, the other numbers mean
-    nothing.
+    """One track at given times, all (n,). If ``there`` is False, the other numbers have no meaning.
 
-    ``there`` is False also where it presses so little that it changes nothing.
+    ``there`` is also False if the touch presses so little that it changes nothing.
     """
 
     there: BoolArray
@@ -67,13 +66,13 @@ class TrackSamples:
 
 
 def always(x_mm: float, y_mm: float, radius_mm: float, law: Law | None = None) -> TouchTrack:
-    """A touch that stays where it is through all recorded frames."""
+    """Return a touch that stays in place through all recorded frames."""
     frame = Keyframe(ALWAYS_S[0], x_mm, y_mm, radius_mm)
     return TouchTrack((frame,), ShortCircuit() if law is None else law, hold=True)
 
 
 def sample(track: TouchTrack, times_s: FloatArray) -> TrackSamples:
-    """``track`` at ``times_s`` (n,), ascending or not."""
+    """Return ``track`` at ``times_s`` (n,), which need not ascend."""
     keys = track.keyframes
     start, end = keys[0].t_s, keys[-1].t_s
     there = (times_s >= start - SLACK_S) & (track.hold | (times_s <= end + SLACK_S))
@@ -89,7 +88,7 @@ def sample(track: TouchTrack, times_s: FloatArray) -> TrackSamples:
 
 
 def touches_of(tracks: Sequence[TouchTrack], time_s: float) -> tuple[TrueTouch, ...]:
-    """The touches that are there at ``time_s``, in the tracks' order."""
+    """Return the touches that exist at ``time_s``, in the order of the tracks."""
     at = np.array([time_s])
     near = [
         track
@@ -101,7 +100,7 @@ def touches_of(tracks: Sequence[TouchTrack], time_s: float) -> tuple[TrueTouch, 
 
 
 def touches_at(samples: Sequence[TrackSamples], frame: int) -> tuple[TrueTouch, ...]:
-    """The touches that are there in ``frame``, in the tracks' order."""
+    """Return the touches that exist in ``frame``, in the order of the tracks."""
     return tuple(
         TrueTouch(x_mm=float(s.x_mm[frame]), y_mm=float(s.y_mm[frame]),
                   radius_mm=float(s.radius_mm[frame]), contrast=float(s.contrast[frame]),

@@ -1,9 +1,9 @@
-"""Shapes of touches that are no even discs: an ellipse, and how the change falls from its middle.
+"""Shapes of touches other than even discs: an ellipse, and profiles that fall off from the middle.
 
 A round indenter presses with sqrt(1 - rho^2) of the pressure in the middle (Hertz, J. reine angew.
-Math. 92, 1882; Johnson, Contact Mechanics, Cambridge 1985, ch. 4), a fingertip with a like dome
-(Pawluk and Howe, J. Biomech. Eng. 121, 1999) that is longer than wide. Conductivity is taken to
-follow the pressure. Imported only where a touch names a shape.
+Math. 92, 1882; Johnson, Contact Mechanics, Cambridge 1985, ch. 4), and a fingertip with a similar
+dome (Pawluk and Howe, J. Biomech. Eng. 121, 1999) that is longer than wide. Conductivity is assumed
+to follow the pressure. This module is imported only if a touch names a shape.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 
-# name: its profile, and its long over short axis where none is given
+# the profile of each shape, and its default for the long over the short axis
 SHAPES = {
     "ellipse": ("flat", 1.5),
     "hertz": ("hertz", 1.0),
@@ -21,19 +21,20 @@ SHAPES = {
     "finger": ("hertz", 1.6),
 }
 MAX_ASPECT = 10.0
-GAUSS_REACH = 2.5  # of the radius; there it has fallen to 1.3 %, and ends
+GAUSS_REACH = 2.5  # in radii: here it has fallen to 1.3 %, and is cut off
 RIM_POINTS = 64
 
 
 @dataclass(frozen=True)
 class TouchShape:
-    """How a touch differs from an even disc.
+    """The differences of a touch from an even disc.
 
     Attributes:
-        profile: how the change of conductivity falls with rho, which is 1 on the touch's ellipse.
-            "flat": not at all; "hertz": as sqrt(1 - rho^2); "gauss": as 2^(-rho^2), half on it.
-        aspect: long over short axis; the ellipse has the area of the disc of the touch's radius.
-        angle_deg: of the long axis, from x towards y.
+        profile: how the change of conductivity falls with rho, which is 1 on the ellipse of the
+            touch. "flat" is constant, "hertz" is sqrt(1 - rho^2), and "gauss" is 2^(-rho^2), which
+            is one half on the ellipse.
+        aspect: long over short axis; the ellipse has the area of the disc with the touch's radius.
+        angle_deg: the direction of the long axis, from x towards y.
     """
 
     profile: str = "flat"
@@ -46,14 +47,15 @@ class TouchShape:
         return math.sqrt(self.aspect) * (GAUSS_REACH if self.profile == "gauss" else 1.0)
 
     def rho2(self, x_mm: FloatArray, y_mm: FloatArray, radius_mm: float) -> FloatArray:
-        """rho^2 (...) at distances (...) from the middle."""
+        """Return rho^2 (...) at distances (...) from the middle."""
         angle, root = math.radians(self.angle_deg), math.sqrt(self.aspect)
         along = x_mm * math.cos(angle) + y_mm * math.sin(angle)
         across = y_mm * math.cos(angle) - x_mm * math.sin(angle)
         return np.asarray(((along / root) ** 2 + (across * root) ** 2) / radius_mm**2)
 
     def change_at(self, x_mm: FloatArray, y_mm: FloatArray, radius_mm: float) -> FloatArray:
-        """The change (...) at distances (...) from the middle, over that in the middle."""
+        """Return the change (...) at distances (...) from the middle, relative to that in the
+        middle."""
         rho2 = self.rho2(x_mm, y_mm, radius_mm)
         if self.profile == "hertz":
             return np.sqrt(np.maximum(1.0 - rho2, 0.0))
@@ -62,7 +64,7 @@ class TouchShape:
         return np.asarray((rho2 <= 1.0).astype(np.float64))
 
     def rim_mm(self, radius_mm: float) -> FloatArray:
-        """Points (64, 2) of the ellipse, from the middle."""
+        """Return points (64, 2) on the ellipse, relative to the middle."""
         angle, root = math.radians(self.angle_deg), math.sqrt(self.aspect)
         turn = np.linspace(0, 2 * np.pi, RIM_POINTS, endpoint=False)
         along, across = radius_mm * root * np.cos(turn), radius_mm / root * np.sin(turn)
@@ -75,6 +77,6 @@ class TouchShape:
 
 
 def named_shape(name: str, aspect: float | None = None, angle_deg: float = 0.0) -> TouchShape:
-    """The shape called ``name``, with its own aspect where none is given."""
-    profile, usual = SHAPES[name]
-    return TouchShape(profile, usual if aspect is None else aspect, angle_deg)
+    """Return the shape called ``name``, with its default aspect unless one is given."""
+    profile, default = SHAPES[name]
+    return TouchShape(profile, default if aspect is None else aspect, angle_deg)

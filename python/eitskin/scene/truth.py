@@ -1,4 +1,4 @@
-"""What was truly there: each frame's touches, the mask of them, and the conductivity that was
+"""The truth of a scene: the touches of each frame, their mask, and the conductivity that was
 solved."""
 
 from dataclasses import replace
@@ -20,12 +20,16 @@ from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.touch_path import sample, touches_at
 
 MAX_CELLS = 500_000_000
-LAW_PIECES = 16  # straight lines between two keyframes, for a law that bends
+LAW_PIECES = 16  # straight lines between two keyframes, for a nonlinear law
 
 
 def truth_of(compiled: Compiled, pixels: int = 64) -> dict[str, Any]:
-    """The truth fields of ``Frames`` of the recorded frames, rastered with ``pixels`` along the
-    longer side, or 0 for no rasters."""
+    """Return the truth fields of ``Frames`` for the recorded frames, rastered with ``pixels`` along
+    the longer side (0: no rasters).
+
+    Raises:
+        UsageError: the rasters would be too large.
+    """
     numbers, states = _states_at_truth(compiled)
     flat = [(frame, t) for frame, k in enumerate(numbers) for t in states[k].touches]
     contrast = np.array([t.contrast for _, t in flat], dtype=np.float64)
@@ -47,7 +51,8 @@ def truth_of(compiled: Compiled, pixels: int = 64) -> dict[str, Any]:
 
 
 def _paths(scene: Scene) -> Paths | None:
-    """The ways of all touches from the first frame's beginning to the last one's end."""
+    """Return the paths of all touches from the beginning of the first frame to the end of the
+    last."""
     end_s, points = scene.frames / scene.rate_hz, []
     for number, track in enumerate(scene.touches):
         keys = track.keyframes
@@ -69,8 +74,8 @@ def _paths(scene: Scene) -> Paths | None:
 
 
 def _states_at_truth(compiled: Compiled) -> tuple[IntArray, list[State]]:
-    """The recorded frames' states when their truth was so, and which one each has (n,); those of
-    frames in which touches move are not solved."""
+    """Return the state of each recorded frame at the instant of its truth (n,), and the states.
+    States of frames in which touches move are not solved."""
     scene, states = compiled.scene, list(compiled.states)
     numbers, samples = compiled.state_of_frame.copy(), scene.samples()
     for place in np.flatnonzero(numbers < 0):
@@ -86,7 +91,8 @@ def _states_at_truth(compiled: Compiled) -> tuple[IntArray, list[State]]:
 def mask_of(
     touches: tuple[TrueTouch, ...], x_mm: FloatArray, y_mm: FloatArray
 ) -> npt.NDArray[np.int8]:
-    """+1 where the centres (h, w) lie in a conductive touch, -1 in a resistive one, else 0."""
+    """Return +1 where the centres (h, w) lie in a conductive touch, -1 in a resistive one,
+    otherwise 0."""
     mask = np.zeros(x_mm.shape, dtype=np.int8)
     for touch in touches:
         inside = touch.covers(x_mm - touch.x_mm, y_mm - touch.y_mm)

@@ -1,1 +1,1 @@
-"""Judging: metrics of images, matching of touches, summaries."""
+"""Score reconstructions: metrics of images, matching of touches, and summaries."""

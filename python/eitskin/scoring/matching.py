@@ -1,4 +1,4 @@
-"""Which found touch is which true one: optimal matching within a gate, and what it leaves over."""
+"""Match found touches with true ones: the optimal matching within a gate."""
 
 import math
 from dataclasses import dataclass
@@ -14,9 +14,12 @@ WANTED_SIGNS = {"increase": (1,), "decrease": (-1,), "both": (1, -1)}
 
 @dataclass(frozen=True)
 class Matching:
-    """How found touches were paired with true ones: ``pairs`` (true index, found index) in the
-    order of the true touches and their ``distances_mm``; ``misses`` and ``false_touches`` were
-    paired with nothing."""
+    """The result of matching found touches with true ones.
+
+    ``pairs`` are (true index, found index) in the order of the true touches, and ``distances_mm``
+    are their distances. ``misses`` and ``false_touches`` count the true and found touches without a
+    partner.
+    """
 
     pairs: tuple[tuple[int, int], ...]
     distances_mm: tuple[float, ...]
@@ -25,20 +28,20 @@ class Matching:
 
     @property
     def hits(self) -> int:
-        """How many true touches were found."""
+        """The number of true touches that were found."""
         return len(self.pairs)
 
     @property
     def exact(self) -> bool:
-        """Every true touch found within the gate, and nothing else."""
+        """Whether every true touch was found within the gate, and nothing else."""
         return self.misses == 0 and self.false_touches == 0
 
 
 def match(true_mm: npt.ArrayLike, found_mm: npt.ArrayLike, gate_mm: float = GATE_MM) -> Matching:
-    """Pair true positions (k, 2) with found ones (l, 2): as many pairs within the gate as possible,
-    then the nearest.
+    """Match true positions (k, 2) with found ones (l, 2): the matching has as many pairs within the
+    gate as possible, and of such matchings the least sum of distances.
 
-    One assignment problem does both: a pair beyond the gate costs more than all pairs within it
+    One assignment problem does both. A pair beyond the gate costs more than all pairs within it
     could together, so that a pair is never given up for shorter distances elsewhere.
     """
     true = np.asarray(true_mm, dtype=np.float64).reshape(-1, 2)
@@ -59,15 +62,16 @@ def match(true_mm: npt.ArrayLike, found_mm: npt.ArrayLike, gate_mm: float = GATE
 
 
 def assign(cost: FloatArray) -> list[int]:
-    """The column of each row of ``cost`` (k, l), k <= l, all different, with the least sum.
+    """Return the column assigned to each row of ``cost`` (k, l), k <= l: different columns with the
+    least sum of costs.
 
-    Shortest augmenting paths with potentials (R. Jonker and A. Volgenant, Computing 38 (1987)
-    325-340, doi 10.1007/BF02278710).
+    The method is shortest augmenting paths with potentials (R. Jonker and A. Volgenant, Computing
+    38 (1987) 325-340, doi 10.1007/BF02278710).
     """
     columns = range(cost.shape[1])
     values: list[list[float]] = cost.tolist()
     of_row, of_column = [0.0] * len(values), [0.0] * len(columns)  # potentials
-    row_at = [-1] * len(columns)  # which row a column is assigned to
+    row_at = [-1] * len(columns)  # the row that each column is assigned to
     for start in range(len(values)):
         least, before = [math.inf] * len(columns), [-1] * len(columns)
         done: list[int] = []

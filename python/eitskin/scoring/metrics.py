@@ -1,14 +1,14 @@
-"""How well an image shows where the touches are: MIoU on a fine raster, as a curve over the
+"""Score how well an image shows where the touches are: MIoU on a fine raster, as a curve over the
 threshold.
 
-The exact rule, with every choice that moves the number, is in docs/reference/metrics.md. In short:
-MIoU = (IoU(background) + IoU(touch)) / 2 over the cells of a fine raster inside the skin; a cell of
-the image is a touch where x > t max(x); the fraction t is chosen once per method, on training
-scenes, and then kept. A cell shows the nearest pixel, or is interpolated between pixels: the choice
-moves every number, so it is always named.
+The exact rule, with every choice that changes the score, is in docs/reference/metrics.md. In short,
+MIoU = (IoU(background) + IoU(touch)) / 2 over the cells of a fine raster inside the skin. A cell of
+the image is a touch if x > t max(x). The fraction t is chosen once per method, on training scenes,
+and then kept. A cell takes the value of the nearest pixel, or is interpolated between pixels; this
+choice changes every score, so it is always named.
 
-Nothing here knows a reconstruction method or a mesh: images come as (frames, pixels), the truth as
-discs or as a mask.
+Nothing here depends on a reconstruction method or a mesh: images are given as (frames, pixels), the
+truth as discs or as a mask.
 """
 
 from dataclasses import dataclass
@@ -28,16 +28,20 @@ LOOKUP = "bilinear"
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """The cells on which masks are compared, squares of ``spacing_mm``: ``points_mm`` (p, 2) are
-    the centres of those that lie inside the skin."""
+    """The cells on which masks are compared: squares of ``spacing_mm`` with the centres
+    ``points_mm`` (p, 2), all inside the skin."""
 
     points_mm: FloatArray
     spacing_mm: float
 
 
 def raster_inside(outline: Outline, spacing_mm: float = RASTER_MM) -> Raster:
-    """Square cells of ``spacing_mm`` over the bounding box; those whose centre is inside
-    ``outline`` are kept."""
+    """Return the square cells of ``spacing_mm`` over the bounding box whose centres are inside
+    ``outline``.
+
+    Raises:
+        UsageError: the spacing is not above 0, or no cell is inside.
+    """
     if not spacing_mm > 0:
         raise UsageError(f"raster spacing {spacing_mm!r} mm must be above 0; 1.5 is usual")
     x0, y0, x1, y1 = outline.bounding_box_mm
@@ -55,8 +59,8 @@ def raster_inside(outline: Outline, spacing_mm: float = RASTER_MM) -> Raster:
 def disc_mask(
     points_mm: FloatArray, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike
 ) -> BoolArray:
-    """Which of ``points_mm`` (p, 2) lie in any disc, given by centres (k, 2) and radii (k,); k may
-    be 0."""
+    """Return a mask (p,) of the ``points_mm`` (p, 2) that lie in any disc. The discs have centres
+    (k, 2) and radii (k,); k may be 0."""
     centres = np.asarray(centres_mm, dtype=np.float64).reshape(-1, 2)
     radii = np.broadcast_to(np.asarray(radii_mm, dtype=np.float64), (len(centres),))
     inside = np.zeros(len(points_mm), dtype=np.bool_)
@@ -69,8 +73,11 @@ def disc_mask(
 def pixel_cover(
     grid: Grid, centres_mm: npt.ArrayLike, radii_mm: npt.ArrayLike, samples: int = 16
 ) -> FloatArray:
-    """The fraction of each pixel that discs cover, from ``samples`` squared points per pixel: (n,).
-    It is the perfect image of these discs: its MIoU is the best that the pixels allow."""
+    """Return the fraction (n,) of each pixel that discs cover, from ``samples`` squared points per
+    pixel.
+
+    It is the perfect image of these discs: its MIoU is the best that the pixels allow.
+    """
     steps = ((np.arange(samples) + 0.5) / samples - 0.5) * grid.pixel_mm
     offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     points = (grid.centres_mm()[:, None, :] + offsets[None]).reshape(-1, 2)
@@ -82,8 +89,11 @@ def pixel_cover(
 def mask_on_points(
     points_mm: FloatArray, mask: npt.ArrayLike, box_mm: tuple[float, float, float, float]
 ) -> BoolArray:
-    """Look a truth mask (ny, nx), row 0 lowest, spread over ``box_mm`` (xmin, ymin, xmax, ymax), up
-    at points (p, 2); outside the box is background."""
+    """Return the values (p,) of a truth mask at points (p, 2).
+
+    The mask (ny, nx), with the lowest row first, covers ``box_mm`` (xmin, ymin, xmax, ymax); points
+    outside the box are background.
+    """
     cells = np.asarray(mask, dtype=np.bool_)
     ny, nx = cells.shape
     x0, y0, x1, y1 = box_mm
@@ -97,32 +107,37 @@ def mask_on_points(
 
 @dataclass(frozen=True, eq=False)
 class Lookup:
-    """How cells show an image: the value of cell i is sum_j weight[i, j] x[pixel[i, j]].
-    ``pixel`` (p, c) are places among the kept pixels, c 1 for "nearest" and 4 for "bilinear"; each
-    row of ``weight`` (p, c) sums to 1."""
+    """The weights by which cells take values from an image: the value of cell i is sum_j weight[i,
+    j] x[pixel[i, j]].
+
+    ``pixel`` (p, c) are indices of kept pixels, with c = 1 for "nearest" and c = 4 for "bilinear".
+    Each row of ``weight`` (p, c) sums to 1.
+    """
 
     pixel: IntArray
     weight: FloatArray
 
     def show(self, values: npt.ArrayLike) -> FloatArray:
-        """Pixel values (..., n) as values of the cells (..., p)."""
+        """Return the values of the cells (..., p) for pixel values (..., n)."""
         return np.asarray(
             (np.asarray(values, dtype=np.float64)[..., self.pixel] * self.weight).sum(axis=-1)
         )
 
 
 def lookup_for(points_mm: FloatArray, grid: Grid, kind: str = LOOKUP) -> Lookup:
-    """The lookup from cells at ``points_mm`` (p, 2) to the kept pixels of ``grid``.
+    """Return the lookup from cells at ``points_mm`` (p, 2) to the kept pixels of ``grid``.
 
-    "nearest" shows the nearest kept pixel. "bilinear" weights the up to four pixels whose centres
-    surround the cell, leaving out those that are not kept (where none is, the nearest one is
-    shown), as smooth pictures do.
+    "nearest" takes the nearest kept pixel. "bilinear" weights the up to four kept pixels whose
+    centres surround the cell, and takes the nearest pixel if none of them is kept.
+
+    Raises:
+        UsageError: ``kind`` is neither of these.
     """
     nearest = _nearest_pixels(points_mm, grid)
     if kind == "nearest":
         return Lookup(nearest[:, None], np.ones((len(points_mm), 1)))
     if kind != "bilinear":
-        raise UsageError(f"lookup {kind!r} is not known; use one of {', '.join(LOOKUPS)}")
+        raise UsageError(f"lookup {kind!r} is unknown; use one of {', '.join(LOOKUPS)}")
     place = (points_mm - np.asarray(grid.origin_mm)) / grid.pixel_mm - 0.5
     low = np.floor(place).astype(np.int64)
     part = place - low
@@ -150,8 +165,11 @@ def lookup_for(points_mm: FloatArray, grid: Grid, kind: str = LOOKUP) -> Lookup:
 
 
 def _nearest_pixels(points_mm: FloatArray, grid: Grid) -> IntArray:
-    """For each point (p, 2) the index of the nearest kept pixel: (p,). Where that is not the pixel
-    around the point, because it is not kept or the point lies on its edge, all are looked at."""
+    """Return the index of the nearest kept pixel for each point (p, 2), as (p,).
+
+    This is usually the pixel around the point. If that pixel is not kept, or the point lies on its
+    edge, the distances to all pixels are compared.
+    """
     place = (points_mm - np.asarray(grid.origin_mm)) / grid.pixel_mm
     on_edge = (np.abs(place - np.rint(place)) < 1e-6).any(axis=1)
     found = np.where(on_edge, -1, grid.locate(points_mm))
@@ -165,12 +183,11 @@ def _nearest_pixels(points_mm: FloatArray, grid: Grid) -> IntArray:
 
 
 def touch_mask(values: npt.ArrayLike, threshold: npt.ArrayLike, sign: int = 1) -> BoolArray:
-    """x > t max(x) along the last axis; ``sign`` = -1 looks for resistive changes (-x > t max(-x)).
+    """Return the mask x > t max(x) along the last axis, or -x > t max(-x) if ``sign`` is -1
+    (resistive changes).
 
     ``threshold`` is one number, or an array that broadcasts against ``values``: (T, 1) gives T
-    masks of one image.
-
-    An image without any value of the wanted sign has no touch: its mask is empty.
+    masks of one image. An image without any value of the wanted sign has an empty mask.
     """
     wanted = sign * np.asarray(values, dtype=np.float64)
     top = wanted.max(axis=-1, keepdims=True)
@@ -178,19 +195,20 @@ def touch_mask(values: npt.ArrayLike, threshold: npt.ArrayLike, sign: int = 1) -
 
 
 def iou(estimate: BoolArray, truth: BoolArray) -> float:
-    """|both| / |either| of two masks of one shape; 1 where both are empty, for then they agree."""
+    """Return |both| / |either| of two masks of the same shape, or 1 if both are empty, as they then
+    agree."""
     either = np.count_nonzero(estimate | truth)
     return float(np.count_nonzero(estimate & truth) / either) if either else 1.0
 
 
 def miou(estimate: BoolArray, truth: BoolArray) -> float:
-    """The mean of IoU(touch) and IoU(background) of two masks of one shape."""
+    """Return the mean of IoU(touch) and IoU(background) of two masks of the same shape."""
     return (iou(estimate, truth) + iou(~estimate, ~truth)) / 2
 
 
 @dataclass(frozen=True, eq=False)
 class ImageScorer:
-    """What MIoU of images of ``n_pixels`` needs: the cells, and what each shows of an image."""
+    """The raster and lookup that the MIoU of images with ``n_pixels`` needs."""
 
     raster: Raster
     lookup: Lookup
@@ -200,6 +218,6 @@ class ImageScorer:
 def judge_for(
     outline: Outline, grid: Grid, spacing_mm: float = RASTER_MM, lookup: str = LOOKUP
 ) -> ImageScorer:
-    """The scorer for images on ``grid`` of a skin."""
+    """Return the scorer for images on ``grid`` of a skin with this outline."""
     raster = raster_inside(outline, spacing_mm)
     return ImageScorer(raster, lookup_for(raster.points_mm, grid, lookup), grid.n_pixels)

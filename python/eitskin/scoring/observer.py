@@ -1,5 +1,5 @@
-"""The truth of a simulated scene as an observer of a session: each frame gets the touches that were
-there and how far off the found ones are, and all of it a score."""
+"""Compare a session with the truth of a simulated scene: each frame gets its true touches and the
+errors of the found ones, and all frames together a score."""
 
 from dataclasses import replace
 from typing import Any
@@ -9,7 +9,7 @@ from eitskin.session.frame import Frame
 
 
 class TruthObserver:
-    """Compares frames with ``truth``; ``score`` adds up how far off they are. An ``Observer`` of
+    """Compares frames with ``truth``, and sums the errors in ``score``. It is an ``Observer`` of
     ``eitskin.session``."""
 
     def __init__(self, truth: SceneTruth) -> None:

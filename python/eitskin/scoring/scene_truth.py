@@ -1,4 +1,4 @@
-"""Where a simulated or emulated board's touches truly are, and how far off the found ones were."""
+"""Compute the true touches of a simulated or emulated board, and the errors of the found ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -19,11 +19,13 @@ WRAP_US = 2**32
 
 
 class SceneTruth:
-    """The touches of ``scene`` at the board's times; ``sign`` is which changes the board looks for.
-    They are those of the end of a frame's scan. Of a frozen scene a simulated board shows the frame
-    that is nearest to the beginning of a scan, an emulated one (``held``) the last that has begun
-    by then. With ``loop`` the scene begins again
-    at its end: a simulated board's with the next scan, an emulated one's at once.
+    """The true touches of ``scene`` at the board's times.
+
+    Only touches with conductivity changes of ``sign`` count. The truth of a frame is that at the
+    end of its scan. In a frozen scene, a simulated board shows the frame of the scene that is
+    nearest to the beginning of a scan, and an emulated one (``held``) the last frame that has begun
+    by then. With ``loop`` the scene starts again at its end: with the next scan on a simulated
+    board, immediately on an emulated one.
     """
 
     def __init__(
@@ -33,15 +35,15 @@ class SceneTruth:
         self._ahead = 1e-9 if held else 0.5
         self.gate_mm = GATE_MM * size_to_paper(scene.skin.outline)
         self._samples, self._wanted = scene.samples(), WANTED_SIGNS[sign]
-        # the board's clock at the scene's time 0; where nobody says, the first frame's asked for
+        # the board's clock at the scene's time 0; unless it is set, that of the first frame
         self.began_us: int | None = None
 
     def look_for(self, sign: str) -> None:
-        """The board looks for other changes from now on."""
+        """Count touches of another sign from now on, as the board does."""
         self._wanted = WANTED_SIGNS[sign]
 
     def touches(self, time_us: int) -> tuple[TrueTouch, ...]:
-        """What a frame shows whose scan began at ``time_us``."""
+        """Return the true touches of a frame whose scan began at ``time_us``."""
         if self.began_us is None:
             self.began_us = time_us
         if self._loop:
@@ -55,12 +57,12 @@ class SceneTruth:
         return tuple(t for t in there if int(np.sign(t.contrast - 1)) in self._wanted)
 
     def over(self, time_us: int) -> bool:
-        """Whether the scene has ended when the scan of a frame begins at ``time_us``."""
+        """Return whether the scene has ended when the scan of a frame begins at ``time_us``."""
         began = self.began_us is not None
         return began and not self._loop and self._frame(time_us) >= self.scene.frames
 
     def _begin_again(self, time_us: int) -> None:
-        """Let time 0 be that of the loop in which a scan begins at ``time_us``."""
+        """Move time 0 to the loop in which a scan begins at ``time_us``."""
         scene, late = self.scene, self._frame(time_us) - self.scene.frames
         if late < 0 or self.began_us is None:
             return
@@ -77,20 +79,20 @@ class SceneTruth:
         return float((time_us - (self.began_us or 0)) % WRAP_US) / 1e6
 
     def matching(self, true: Sequence[TrueTouch], found_mm: npt.ArrayLike) -> Matching:
-        """Which of the found places (k, 2) in mm is which true touch; within 10 mm on the paper's
-        skin, else in proportion."""
+        """Match true touches with found places (k, 2) in mm, within 10 mm on the paper's skin and
+        in proportion to the size of other skins."""
         return match([(t.x_mm, t.y_mm) for t in true], found_mm, self.gate_mm)
 
 
 def truth_of(scene: SimulatedScene, sign: str = "increase") -> SceneTruth:
-    """The truth of the scene before a simulated skin, for a board that looks for changes of
-    ``sign``. Raises as ``find_scene``."""
+    """Return the truth of the scene of a simulated skin, for a board that looks for changes of
+    ``sign``. Raises the errors of ``find_scene``."""
     return SceneTruth(find_scene(scene.name), sign, held=scene.held, loop=scene.loop)
 
 
 @dataclass
 class TruthScore:
-    """Matchings of many frames, added up: touches found and not, false ones, and position
+    """The sums over the matchings of many frames: touches found, missed and false, and position
     errors in mm."""
 
     frames: int = 0
@@ -108,7 +110,7 @@ class TruthScore:
             self.errors_mm.add(distance)
 
     def as_dict(self) -> dict[str, float | int | None]:
-        """For JSON; None for an error where nothing was found."""
+        """Return the score as JSON values; errors are None if nothing was found."""
         some = self.errors_mm.count > 0
         return {
             "frames": self.frames,
@@ -122,7 +124,7 @@ class TruthScore:
     def text(self) -> str:
         facts = self.as_dict()
         line = (
-            f"against the scene's truth: {facts['found']} of {facts['true']} touches found,"
+            f"compared with the scene's truth: {facts['found']} of {facts['true']} touches found,"
             f" {facts['false']} false"
         )
         if self.errors_mm.count:

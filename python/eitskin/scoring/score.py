@@ -1,4 +1,4 @@
-"""How well a reconstruction agrees with the truth that its frames carry."""
+"""Score how well a reconstruction agrees with the truth that its frames hold."""
 
 from dataclasses import dataclass
 
@@ -16,8 +16,9 @@ from eitskin.skin.skin import size_to_paper
 
 @dataclass(frozen=True)
 class FrameScore:
-    """One frame against its truth: MIoU of the image's mask x > t max(x), t the model's own,
-    interpolated bilinearly; MIoU of the touches as discs; and how touches match the true ones."""
+    """The score of a frame: the MIoU of the image's mask x > t max(x), interpolated bilinearly,
+    with the model's own t; the MIoU of the touches as discs; and the matching of found and true
+    touches."""
 
     miou_image: float
     miou_touches: float
@@ -25,14 +26,16 @@ class FrameScore:
 
     @property
     def errors_mm(self) -> dict[int, float]:
-        """Position error of each found touch that has a true one."""
+        """The position error of each found touch that matches a true one, by the number of the
+        found touch."""
         found = (k for _, k in self.matching.pairs)
         return dict(zip(found, self.matching.distances_mm, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
 class Scorer:
-    """Scores the frames of one model; ``gate_mm`` is how near a touch must be to its true one."""
+    """Scores the frames of one model. ``gate_mm`` is the greatest distance from a touch to its true
+    one."""
 
     model: Model
     image_scorer: metrics.ImageScorer
@@ -41,7 +44,8 @@ class Scorer:
     def score(
         self, frames: Frames, number: int, result: Reconstruction, sign: str
     ) -> FrameScore | None:
-        """Frame ``number`` of ``frames``; None where no truth of the wanted ``sign`` is known."""
+        """Return the score of frame ``number`` of ``frames``, or None if no truth of the wanted
+        ``sign`` is known."""
         wanted = WANTED_SIGNS[sign]
         places = [i for i in frames.touches_in(number) if _sign_of(frames, i) in wanted]
         truth = self._truth(frames, number, wanted, places)
@@ -82,14 +86,14 @@ class Scorer:
 
 
 def _sign_of(frames: Frames, touch: int) -> int:
-    """Unknown signs count as conductive: what a touch is."""
+    """Return the sign of a touch; an unknown sign counts as conductive, the usual one."""
     sign = 0 if frames.touch_sign is None else int(frames.touch_sign[touch])
     return sign or 1
 
 
 def scorer_for(model: Model) -> Scorer:
-    """The scorer on the model's own skin: a raster of 1.5 mm and a gate of 10 mm on the paper's
-    skin, in proportion elsewhere."""
+    """Return the scorer on the model's own skin: a raster of 1.5 mm and a gate of 10 mm on the
+    paper's skin, in proportion to the size of other skins."""
     outline = model.skin.outline
     scale = size_to_paper(outline)
     image_scorer = metrics.judge_for(outline, model.grid, metrics.RASTER_MM * scale)

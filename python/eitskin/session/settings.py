@@ -12,8 +12,8 @@ from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import UsageError
-from eitskin.tuning.for_model import chosen_point, settings_text
-from eitskin.tuning.front import REPORT_US, Target, board_takes
+from eitskin.tuning.for_model import operating_point_for, settings_text
+from eitskin.tuning.front import REPORT_US, Preset, board_takes
 
 KINDS = ("raw", "image", "touches", "events")
 Say: TypeAlias = Callable[[str], None]
@@ -44,7 +44,7 @@ class SessionSettings:
         model_for: what cannot do without the board's model, such as "a picture"; "": nothing.
         tare: take the reference from so many frames; None: from 16 where that is needed.
         zones: named places that fingers press (``eitskin.session.zones``).
-        target: a budget or an accuracy that chooses the solver's settings.
+        target: a preset that chooses the solver's settings.
         record: a new recording of every packet; an existing file is written over.
         quiet_frames: the untouched frames of the reference are sent too, and their mean is kept.
     """
@@ -59,7 +59,7 @@ class SessionSettings:
     scan: ScanSettings = field(default_factory=ScanSettings)
     solver: SolverSettings = field(default_factory=SolverSettings)
     zones: tuple[Zone, ...] = ()
-    target: "Target | None" = None
+    target: "Preset | None" = None
     tare: int | None = None
     record: Path | None = None
     quiet_frames: bool = False
@@ -73,10 +73,10 @@ class SessionSettings:
         if target is None:
             return scan, named
 
-        known = known or need_model(board, self.model, name, "a budget")
+        known = known or need_model(board, self.model, name, "a preset")
         any_scan = target.unit == REPORT_US
         now = named.applied(known.model, board)
-        point = chosen_point(target, known.model, now, board_takes(), any_scan)
+        point = operating_point_for(target, known.model, now, board_takes(), any_scan)
         say(settings_text(point, target.board))
         one = point.configuration
         kept = {k: value for k, value in one.solver_settings.items() if k in board_takes()}
@@ -90,7 +90,7 @@ class SessionSettings:
         """A recording takes no settings."""
         named: dict[str, Any] = {**self.scan.named, **self.solver.named}
         if self.target is not None:
-            named["preset, budget or accuracy"] = True
+            named["preset"] = True
         if named or self.tare is not None:
             what = next(iter(named), "tare").replace("_", "-")
             raise UsageError(

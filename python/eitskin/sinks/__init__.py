@@ -1,1 +1,2 @@
-"""Where touches go: a file a sink, found by the entry points of the group ``eitskin.sinks``."""
+"""Send touches to other programs: a file per sink, found by the entry points of the group
+``eitskin.sinks``."""

@@ -1,6 +1,6 @@
-"""``csv:FILE``: a line a touch, and one with empty cells for a frame, or of ``--report drive`` a
-drive, without touches. Each line is written whole as it comes, so that a killed program leaves a
-readable file."""
+"""``csv:FILE``: write a line per touch. A frame without touches, or a drive without touches with
+``--report drive``, gets one line with empty cells. Each line is written completely as it arrives,
+so that a killed program leaves a readable file."""
 
 import csv
 from io import StringIO
@@ -17,12 +17,17 @@ TOUCH = (
     "x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2", "long_x_mm", "long_y_mm",
 )  # fmt: skip
 HEAD = ("frame", "time_s", "time_unix_s")
-DRIVE = ("drive", "vx_mm_per_s", "vy_mm_per_s", "confirmed")  # of a drive; empty in frames' lines
+DRIVE = (
+    "drive",
+    "vx_mm_per_s",
+    "vy_mm_per_s",
+    "confirmed",
+)  # empty in the lines of frames
 COLUMNS = (*HEAD, *TOUCH, "found", "refused", "events", *DRIVE)
 
 
 class CsvSink:
-    """One open file, written to after each frame."""
+    """An open CSV file, written to after each frame."""
 
     def __init__(self, file: RecordingFile) -> None:
         self._file = file
@@ -50,7 +55,12 @@ def _text(rows: list[Any]) -> bytes:
 
 
 def new_file(url: str, source: TouchSource, first: bytes = b"") -> RecordingFile:
-    """The file that ``csv:FILE`` and the like name, begun with ``first``."""
+    """Return a new file for a URL such as ``csv:FILE``, with ``first`` written to it.
+
+    Raises:
+        UsageError: the URL names no file.
+        FileError: the file exists and may not be overwritten, or cannot be written.
+    """
     scheme, _, name = url.partition(":")
     if not name:
         raise UsageError(f"--to {url}: name a file, as in  {scheme}:touches.{scheme}")
@@ -58,7 +68,7 @@ def new_file(url: str, source: TouchSource, first: bytes = b"") -> RecordingFile
     refuse_unwritable(path)
     if path.exists() and not source.overwrite:
         raise FileError(
-            f"{path}: exists already; name another file, or write over it with  --overwrite"
+            f"{path}: exists already; name another file, or overwrite it with  --overwrite"
         )
     return RecordingFile(path, first, overwrite=source.overwrite)
 

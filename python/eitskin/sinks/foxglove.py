@@ -1,8 +1,8 @@
-"""``foxglove:[//HOST[:8765]]``: a live server that the Foxglove application connects to.
+"""``foxglove:[//HOST[:8765]]``: start a live server that the Foxglove application connects to.
 
 /touches carries the message of docs/reference/message.md with its schema, /notices the notices,
-/reports touches after drives where those are reported, /image a foxglove.RawImage where images are
-streamed.
+/reports the touches after drives if those are reported, and /image a foxglove.RawImage if images
+are streamed.
 """
 
 import json
@@ -17,12 +17,12 @@ from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, noth
 
 USAGE = "foxglove: or foxglove://HOST:PORT"
 PORT = 8765
-BACKLOG = 128  # messages a client that does not read is kept; the oldest go
+BACKLOG = 128  # messages kept for a client that does not read; the oldest are dropped
 TOPICS = {"frame": "/touches", "report": "/reports", "notice": "/notices"}
 
 
 class FoxgloveSink:
-    """A server of the Foxglove SDK, with channels of its own.
+    """A server of the Foxglove SDK with its own channels.
 
     Raises:
         MissingExtraError: foxglove-sdk is not installed.
@@ -37,7 +37,7 @@ class FoxgloveSink:
         except ImportError:
             raise missing_extra("foxglove", "foxglove-sdk") from None
         self._image, self._time, self._model = RawImage, Timestamp, source.model
-        self._context = context = foxglove.Context()  # its channels close with it
+        self._context = context = foxglove.Context()  # closing it closes its channels
         described = schema()
         defined = {"$defs": described["$defs"]}
         channels = {
@@ -94,7 +94,7 @@ class FoxgloveSink:
 
 
 def open_sink(url: str, source: TouchSource) -> Sink:
-    """See the module."""
+    """Open the sink of the module's docstring."""
     named = "foxglove://" if url == "foxglove:" else url
     parts, host, port = address(named, PORT, usage=USAGE)
     nothing_more(url, parts, USAGE)

@@ -1,9 +1,11 @@
-"""``lsl:[NAME][?touches=N]``: a stream of the Lab Streaming Layer, one sample a frame.
+"""``lsl:[NAME][?touches=N]``: publish a stream of the Lab Streaming Layer with one sample per
+frame.
 
-Float32 channels: the number of touches, then id, x_mm, y_mm, radius_mm, strength and force_n of the
-N strongest (8 where none is named), NaN where there is none. With ``--report drive`` a second
-stream, NAME-drives, from the first report on: double64 channels time_s and the number of touches,
-then id, confirmed, x_mm, y_mm, vx_mm_per_s, vy_mm_per_s and strength of each. Both are irregular.
+The float32 channels are the number of touches, then id, x_mm, y_mm, radius_mm, strength and force_n
+of the N strongest touches (8 by default), NaN for missing ones. With ``--report drive`` a second
+stream, NAME-drives, starts at the first report. Its double64 channels are time_s and the number of
+touches, then id, confirmed, x_mm, y_mm, vx_mm_per_s, vy_mm_per_s and strength of each. Both streams
+are irregular.
 """
 
 import os
@@ -14,7 +16,7 @@ from urllib.parse import quote
 from eitskin.errors import SinkError, UsageError, missing_extra
 from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, or_nan, setting
 
-QUIET = "[log]\nlevel = -2\n"  # no lines of its own but of what goes wrong
+QUIET = "[log]\nlevel = -2\n"  # liblsl prints errors only
 FIELDS = ("id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n")
 MOVING = ("id", "confirmed", "x_mm", "y_mm", "vx_mm_per_s", "vy_mm_per_s", "strength_s_per_m_mm2")
 UNITS = {
@@ -24,11 +26,11 @@ UNITS = {
 
 
 class LslSink:
-    """An outlet of frames, and one of drives where they are reported; samples carry LSL's own clock
-    at the time they are sent.
+    """An outlet of frames, and one of drives if they are reported. Samples carry LSL's own clock at
+    the time they are sent.
 
     Raises:
-        RuntimeError: liblsl opens none.
+        RuntimeError: liblsl cannot open an outlet.
     """
 
     def __init__(self, name: str, source: TouchSource, touches: int) -> None:
@@ -48,7 +50,7 @@ class LslSink:
             self._push(self._drives, [message["time_s"]], message["touches"], MOVING)
 
     def close(self) -> None:
-        self._frames = self._drives = None  # their destructors say goodbye
+        self._frames = self._drives = None  # their destructors close the streams
 
     def _outlet(self, name: str, first: list[str], fields: Sequence[str], kind: str) -> Any:
         from pylsl import StreamInfo, StreamOutlet
@@ -78,7 +80,7 @@ def open_sink(url: str, source: TouchSource) -> Sink:
     name, _, query = url.partition(":")[2].partition("?")
     touches = setting(url, query, "touches", 1, 64, 8)
     if "/" in name:
-        raise UsageError(f"--to {url}: write  lsl:NAME , the stream's name without slashes")
+        raise UsageError(f"--to {url}: write  lsl:NAME  with a name without slashes")
     try:
         from pylsl import set_config_content
     except (ImportError, RuntimeError, OSError):
@@ -88,4 +90,6 @@ def open_sink(url: str, source: TouchSource) -> Sink:
     try:
         return LslSink(name or "eitskin", source, touches)
     except Exception as error:
-        raise SinkError(f"--to {url}: liblsl opens no outlet ({error}); try another name") from None
+        raise SinkError(
+            f"--to {url}: liblsl opened no outlet ({error}); try another name"
+        ) from None

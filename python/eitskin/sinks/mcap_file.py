@@ -1,9 +1,10 @@
-"""``mcap:FILE``: a recording of ROS 2 messages (CDR), for ROS, Foxglove and the like.
+"""``mcap:FILE``: record ROS 2 messages (CDR) for ROS, Foxglove and similar programs.
 
-/touches eitskin_msgs/msg/TouchArray, /reports eitskin_msgs/msg/Report with ``--report drive``,
-/image sensor_msgs/msg/Image where images are streamed, /diagnostics
-diagnostic_msgs/msg/DiagnosticArray when they change. The file is written in chunks of about a
-second: a killed program loses the last. The list of chunks stays in memory until the end.
+The topics are /touches with eitskin_msgs/msg/TouchArray, /reports with eitskin_msgs/msg/Report if
+``--report drive`` is set, /image with sensor_msgs/msg/Image if images are streamed, and
+/diagnostics with diagnostic_msgs/msg/DiagnosticArray when the diagnostics change. The file is
+written in chunks of about a second, and a killed program loses the last chunk. The list of chunks
+stays in memory until the end.
 """
 
 from typing import Any
@@ -13,12 +14,12 @@ from eitskin.sinks import ros2
 from eitskin.sinks.csv_file import new_file
 from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource
 
-CHUNK_BYTES, REPORTS_BYTES, IMAGES_BYTES = 1 << 14, 1 << 16, 1 << 18  # touches alone, with these
+CHUNK_BYTES, REPORTS_BYTES, IMAGES_BYTES = 1 << 14, 1 << 16, 1 << 18  # about a second of each
 FRAME_ID = "skin"
 
 
 class McapSink:
-    """One open file."""
+    """An open MCAP file."""
 
     def __init__(self, stream: Any, source: TouchSource) -> None:
         self._stream, self._source = stream, source

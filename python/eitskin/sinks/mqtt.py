@@ -1,5 +1,5 @@
-"""``mqtt://[USER:PASSWORD@]HOST[:1883][/topic]``: each message to topic/frame, topic/notice or
-topic/summary of a broker; the topic is eitskin where none is named."""
+"""``mqtt://[USER:PASSWORD@]HOST[:1883][/topic]``: publish each message to topic/frame,
+topic/report, topic/notice or topic/summary of a broker. The default topic is eitskin."""
 
 import threading
 from typing import Any
@@ -23,8 +23,8 @@ SENT_S = 1.0
 
 
 class MqttSink:
-    """Quality of service 0; while the broker is away everything is dropped, and the connection is
-    made again by itself."""
+    """A connection to a broker with quality of service 0. While the broker is away, messages are
+    dropped and the client reconnects by itself."""
 
     def __init__(self, client: Any, topic: str) -> None:
         self._client, self._topic = client, topic
@@ -40,12 +40,17 @@ class MqttSink:
             raise Dropped
 
     def _sent(self) -> bool:
-        """Whether the last one has gone out, so that nothing piles up in the client."""
+        """Return whether the last message has been sent, so that messages do not pile up in the
+        client.
+
+        Raises:
+            Dropped: the broker went away meanwhile.
+        """
         if self._last is None:
             return True
         try:
             self._last.wait_for_publish(SENT_S)
-        except (RuntimeError, ValueError):  # the broker went meanwhile
+        except (RuntimeError, ValueError):  # the broker went away meanwhile
             self._last = None
             raise Dropped from None
         return bool(self._last.is_published())
@@ -56,11 +61,11 @@ class MqttSink:
 
 
 def open_sink(url: str, source: TouchSource) -> Sink:
-    """See the module.
+    """Connect to the broker that ``url`` names.
 
     Raises:
-        UsageError: as ``address``.
-        SinkError: no broker answers there, or it refuses.
+        UsageError: the address cannot be read.
+        SinkError: no broker answers, or it refuses.
         MissingExtraError: paho-mqtt is not installed.
     """
     parts, host, port = address(url, PORT, usage=USAGE)

@@ -1,9 +1,10 @@
-"""``osc://HOST:PORT[/prefix]``: a bundle of OSC messages a frame, over UDP.
+"""``osc://HOST:PORT[/prefix]``: send a bundle of OSC messages per frame over UDP.
 
-/eitskin/frame number time_s touches; then for each touch /eitskin/touch id x_mm y_mm radius_mm
-strength force_n confidence (nil where one is not known); /eitskin/event kind x_mm y_mm
-direction_deg value zone touch_ids...; /eitskin/notice kind text. After a drive /eitskin/drive frame
-drive time_s touches, then for each /eitskin/moving id x_mm y_mm vx_mm_per_s vy_mm_per_s strength.
+The messages of a frame are /eitskin/frame number time_s touches; for each touch /eitskin/touch id
+x_mm y_mm radius_mm strength force_n confidence (nil if unknown); and /eitskin/event kind x_mm y_mm
+direction_deg value zone touch_ids... After a drive, /eitskin/drive frame drive time_s touches is
+sent, then for each touch /eitskin/moving id x_mm y_mm vx_mm_per_s vy_mm_per_s strength. Notices are
+sent as /eitskin/notice kind text.
 """
 
 from importlib.util import find_spec
@@ -22,7 +23,7 @@ def need_osc(extra: str) -> None:
 
 
 def bundle(messages: list[tuple[str, list[Any]]]) -> bytes:
-    """An OSC bundle, to be handled at once; None becomes nil."""
+    """Return an OSC bundle that is handled at once; None becomes nil."""
     from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
     from pythonosc.osc_message_builder import OscMessageBuilder
 
@@ -37,7 +38,7 @@ def bundle(messages: list[tuple[str, list[Any]]]) -> bytes:
 
 
 class OscSink:
-    """A datagram a frame."""
+    """A socket that sends a datagram per frame."""
 
     def __init__(self, target: Any, prefix: str) -> None:
         self._socket, self._prefix = target, prefix
@@ -54,7 +55,7 @@ class OscSink:
 
 
 def osc_messages(message: dict[str, Any]) -> list[tuple[str, list[Any]]]:
-    """Paths and arguments of a message; none of a summary."""
+    """Return the paths and arguments for a message, or an empty list for a summary."""
     if message["type"] == "notice":
         return [("/notice", [message["kind"], message["text"]])]
     if message["type"] == "report":

@@ -1,6 +1,5 @@
-"""All sinks of a session, each behind a bounded queue with a thread of its own: what is slow or
-gone drops and counts, and holds up nobody.
-"""
+"""Run all sinks of a session, each behind a bounded queue with its own thread: a slow or lost sink
+drops and counts messages, and delays nothing else."""
 
 import threading
 import time
@@ -18,19 +17,19 @@ from eitskin.session.session import Session
 from eitskin.sinks.sink import Dropped, OutgoingMessage, Sink, TouchSource, without_password
 
 ENTRY_POINT_GROUP = "eitskin.sinks"
-ROOM = 64  # frames: more than a second
-DRIVES = 16  # reports of as many drives wait beside each frame
+ROOM = 64  # frames: more than a second at 48 frames per second
+DRIVES = 16  # reports that may wait per frame of ROOM
 PATIENCE_S = 2.0
-ENDING_S = 3.0  # for all sinks together
+ENDING_S = 3.0  # total for all sinks
 
 
 def sinks() -> dict[str, EntryPoint]:
-    """Those that are installed, by the scheme of their URLs."""
+    """Return the installed sinks by the scheme of their URLs."""
     return {one.name: one for one in entry_points(group=ENTRY_POINT_GROUP)}
 
 
 def open_sink(url: str, source: TouchSource) -> Sink:
-    """The sink behind ``url``.
+    """Open the sink that ``url`` names.
 
     Raises:
         UsageError: its scheme is unknown, or its address cannot be read.
@@ -54,9 +53,12 @@ def open_sink(url: str, source: TouchSource) -> Sink:
 
 
 class Outputs:
-    """The sinks of ``urls``, open. ``patient``: the board runs only while it is asked and is not
-    paced, so that a sink that is behind may be waited for, 2 s at most; else never. ``say`` gets a
-    line where one fails."""
+    """The open sinks of ``urls``.
+
+    With ``patient``, a full queue is waited for, at most 2 s; this suits a board that sends only
+    when it is asked and is not paced by a clock. Otherwise items are dropped at once. ``say`` is
+    called with a line when a sink fails. ``room`` is the length of each queue in frames.
+    """
 
     def __init__(
         self,
@@ -97,7 +99,7 @@ class Outputs:
         return self.counts
 
     def close(self) -> None:
-        """Let each send what it still has, for 3 s; may be called twice."""
+        """Let each sink send what is still queued, for at most 3 s; may be called twice."""
         for one in self._queues:
             one.begin_end()
         end_s = time.monotonic() + ENDING_S
@@ -106,12 +108,12 @@ class Outputs:
 
     @property
     def counts(self) -> list[dict[str, Any]]:
-        """Of each sink: what was sent, dropped and failed, and the last error."""
+        """For each sink, how many items were sent, dropped and failed, and the last error."""
         return [one.counts for one in self._queues]
 
     @property
     def lines(self) -> list[str]:
-        """The counts, for reading."""
+        """The counts as lines of text."""
         return [
             f"to {one['url']}: {one['sent']} sent"
             + (f", {one['dropped']} dropped" if one["dropped"] else "")
@@ -128,8 +130,8 @@ def attached_outputs(
     overwrite: bool = False,
     say: Callable[[str], None] = lambda text: None,
 ) -> Iterator[Outputs]:
-    """The sinks of ``urls``, which get every message of the open ``session``. Raises as
-    ``Outputs``."""
+    """Open the sinks of ``urls``, and attach them to the open ``session``, so that they get every
+    message. Raises the errors of ``Outputs``."""
     model = None if session.known is None else session.known.model
     board = session.device.board.board
     source = TouchSource(session.device.transport.url, board, model, overwrite)
@@ -139,13 +141,13 @@ def attached_outputs(
 
 
 class Queue:
-    """A sink's queue and thread."""
+    """The queue and thread of a sink."""
 
     def __init__(self, url: str, sink: Sink, say: Callable[[str], None], room: int) -> None:
         self._url, self._sink = without_password(url), sink
         self._say, self._room = say, room
         self._waiting: deque[OutgoingMessage] = deque()
-        self._reports = 0  # of those
+        self._reports = 0  # how many of the waiting items are reports
         self._changed = threading.Condition()
         self._ending = self._slow = False
         self._sent = self._dropped = self._failed = 0
@@ -154,8 +156,8 @@ class Queue:
         self._thread.start()
 
     def put(self, outgoing: OutgoingMessage, patience_s: float) -> None:
-        """Queue it, or where there is no room, not within the patience either, drop and count it; a
-        sink that took nothing through all of that is not waited for again until it does."""
+        """Queue an item, or drop and count it if there is no room within ``patience_s``. A sink
+        that made no room in that time is not waited for again until it takes an item."""
         is_report = outgoing.report is not None
 
         def room() -> bool:
@@ -174,13 +176,13 @@ class Queue:
             self._changed.notify_all()
 
     def begin_end(self) -> None:
-        """Take no more."""
+        """Refuse further items."""
         with self._changed:
             self._ending = True
             self._changed.notify_all()
 
     def end(self, timeout_s: float) -> None:
-        """Wait for what is queued; what is left then is dropped."""
+        """Wait until the queue is empty, then drop and count what is left after ``timeout_s``."""
         self._thread.join(max(timeout_s, 0.0))
         with self._changed:
             self._dropped += len(self._waiting)
@@ -220,7 +222,7 @@ class Queue:
             self._fail(error)
 
     def _fail(self, error: Exception) -> None:
-        """Count it, and say it once."""
+        """Count an error, and report it unless it is the same as the last one."""
         self._failed += 1
         text = " ".join(str(error).split()) or type(error).__name__
         if text != self._error:

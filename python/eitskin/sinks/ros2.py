@@ -1,8 +1,7 @@
-"""Messages of ROS 2 as plain tables: a touch array and a report after a drive (``msg/``),
+"""Make messages of ROS 2 as plain tables: a touch array and a report after a drive (``msg/``),
 sensor_msgs/Image and diagnostic_msgs/DiagnosticArray.
 
-``mcap:`` writes them, and the node in examples/python/ros2 publishes them. They know nothing of
-ROS.
+``mcap:`` writes them, and the node in examples/python/ros2 publishes them. Nothing here needs ROS.
 """
 
 import math
@@ -50,7 +49,8 @@ KEY_VALUE = "string key\nstring value\n"
 
 
 def definitions() -> dict[str, str]:
-    """Each type's definition with those that it uses, as ros2msg files have them."""
+    """Return the definition of each message type together with the types it uses, in the format of
+    ros2msg files."""
     folder = files("eitskin.sinks").joinpath("msg")
     touch = folder.joinpath("Touch.msg").read_text("utf-8")
     array = folder.joinpath("TouchArray.msg").read_text("utf-8")
@@ -71,12 +71,12 @@ def _whole(first: str, others: dict[str, str]) -> str:
 
 
 def header(time_ns: int, frame_id: str) -> Table:
-    """std_msgs/Header."""
+    """Return a std_msgs/Header."""
     return {"stamp": {"sec": time_ns // 10**9, "nanosec": time_ns % 10**9}, "frame_id": frame_id}
 
 
 def touch_array(message: Table, time_ns: int, frame_id: str) -> Table:
-    """eitskin_msgs/TouchArray of a frame's message."""
+    """Return the eitskin_msgs/TouchArray for a frame's message."""
     touches = [
         {
             "id": touch["id"],
@@ -95,13 +95,14 @@ def touch_array(message: Table, time_ns: int, frame_id: str) -> Table:
 
 
 def report(message: Table, time_ns: int, frame_id: str) -> Table:
-    """eitskin_msgs/Report of a message of touches after a drive."""
+    """Return the eitskin_msgs/Report for a message of touches after a drive."""
     head = {name: message[name] for name in ("frame", "drive", "time_s", "touches")}
     return {"header": header(time_ns, frame_id)} | head
 
 
 def image(grid: Grid, values: "npt.ArrayLike", time_ns: int, frame_id: str) -> Table:
-    """sensor_msgs/Image, 32FC1 in S/m: row 0 is the highest y, NaN outside the skin."""
+    """Return a sensor_msgs/Image in encoding 32FC1 and S/m: row 0 has the highest y, and pixels
+    outside the skin are NaN."""
     picture = np.ascontiguousarray(grid.image(values)[::-1], dtype="<f4")
     height, width = picture.shape
     return {
@@ -116,7 +117,7 @@ def image(grid: Grid, values: "npt.ArrayLike", time_ns: int, frame_id: str) -> T
 
 
 def diagnostics(message: Table, time_ns: int, frame_id: str, hardware: str) -> Table:
-    """diagnostic_msgs/DiagnosticArray of a frame's or a notice's message."""
+    """Return the diagnostic_msgs/DiagnosticArray for the message of a frame or a notice."""
     if message["type"] == "notice":
         status = [_status(WARN, f"eitskin {message['kind']}", message["text"], hardware)]
     elif message["refused"] is not None:

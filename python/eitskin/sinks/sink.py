@@ -1,4 +1,4 @@
-"""What a sink is, what it is given, and how its address is read."""
+"""Define what a sink is, what it is given, and how its address is read."""
 
 import math
 import re
@@ -17,14 +17,14 @@ THIS_MACHINE = "127.0.0.1"
 
 
 class Dropped(Exception):
-    """A sink could not take this one for now, such as while its broker is away. It is counted
-    without a line for the user."""
+    """A sink cannot take an item for now, for example while its broker is away. The item is
+    counted, and no error is reported."""
 
 
 @dataclass(frozen=True, eq=False)
 class TouchSource:
-    """Whose touches they are: the device's URL, its board, and its model where the host has it.
-    ``overwrite``: files that exist may be written over."""
+    """The origin of touches: the device's URL, its board, and its model if the host has it.
+    ``overwrite`` allows overwriting existing files."""
 
     url: str
     board: str = ""
@@ -33,13 +33,13 @@ class TouchSource:
 
     @property
     def box_mm(self) -> Box | None:
-        """The skin's bounding box (x0, y0, x1, y1); None where the model is not known."""
+        """The skin's bounding box (x0, y0, x1, y1), or None if the model is not known."""
         return None if self.model is None else self.model.skin.outline.bounding_box_mm
 
 
 class OutgoingMessage:
-    """A frame, touches after a drive, a notice, or the ``summary`` message that ends it all, on its
-    way to sinks. What they share is made once, by the first that asks for it."""
+    """An item on its way to sinks: a frame, touches after a drive, a notice, or the final
+    ``summary`` message. The message and its text are made once, when a sink first asks for them."""
 
     def __init__(self, item: Message | dict[str, Any]) -> None:
         self.frame = item if isinstance(item, Frame) else None
@@ -49,12 +49,12 @@ class OutgoingMessage:
 
     @cached_property
     def message(self) -> dict[str, Any]:
-        """As docs/reference/message.md."""
+        """The message of docs/reference/message.md."""
         return self._item if isinstance(self._item, dict) else self._item.message()
 
     @cached_property
     def time_ns(self) -> int:
-        """The message's time, UTC where that is known."""
+        """The message's time, in UTC if that is known."""
         unix_s = self.message["time_unix_s"]
         return round(1e9 * ((self.message["time_s"] if unix_s is None else unix_s) or 0.0))
 
@@ -65,46 +65,56 @@ class OutgoingMessage:
 
 
 class Sink(Protocol):
-    """An open way out. All but opening it happens in one thread of its own.
+    """An open output. All calls except opening it are made in a thread of its own.
 
-    A module of a sink has ``open_sink(url, source)``, which its entry point names. It raises an
-    EitskinError of one line where the sink cannot be opened.
+    The module of a sink has a function ``open_sink(url, source)``, which its entry point names. It
+    raises an EitskinError of one line if the sink cannot be opened.
     """
 
     def write(self, outgoing: OutgoingMessage) -> None:
-        """Send it; may take its time. Raises Dropped, or whatever went wrong, which is counted."""
+        """Send an item; this may take time. Raises Dropped, or any other error, which is
+        counted."""
 
     def close(self) -> None:
-        """Finish files, let go of ports."""
+        """Finish files and release ports."""
 
 
 def without_password(url: str) -> str:
-    """``url`` as it may be shown."""
+    """Return ``url`` with its password hidden."""
     return re.sub(r"(?<=//)([^/@:]*):[^/@]*@", r"\1:...@", url)
 
 
 def address(
     url: str, port: int | None, *, usage: str, lowest: int = 1
 ) -> tuple[SplitResult, str, int]:
-    """The parts of ``url``, its host (this machine where none is named) and port; a server may have
-    0 as its ``lowest``, which is any."""
+    """Return the parts of ``url``, its host (this machine if none is named) and its port.
+
+    ``port`` is the default. A server passes 0 as ``lowest``, and port 0 then means any free port.
+
+    Raises:
+        UsageError: the URL is not an address.
+    """
     shown = without_password(url)
     try:
         parts = urlsplit(url)
         named = parts.port
     except ValueError:
-        raise UsageError(f"--to {shown}: no address; write  {usage}") from None
+        raise UsageError(f"--to {shown}: not an address; write  {usage}") from None
     chosen = port if named is None else named
     if not url.startswith(f"{parts.scheme}://") or chosen is None or not lowest <= chosen <= 65535:
         raise UsageError(f"--to {shown}: write  {usage}")
     return parts, parts.hostname or THIS_MACHINE, chosen
 
 
-def setting(url: str, query: str, name: str, low: int, high: int, usual: int) -> int:
-    """The whole number ``name=N`` of a query; ``usual`` where it is empty."""
+def setting(url: str, query: str, name: str, low: int, high: int, default: int) -> int:
+    """Return the whole number in the query ``name=N``, or ``default`` if the query is empty.
+
+    Raises:
+        UsageError: the query is not ``name=N`` with N from ``low`` to ``high``.
+    """
     try:
         values = parse_qs(query, strict_parsing=True, keep_blank_values=True) if query else {}
-        number = int(values.pop(name, [str(usual)])[-1])
+        number = int(values.pop(name, [str(default)])[-1])
         if values or not low <= number <= high:
             raise ValueError
     except ValueError:
@@ -115,7 +125,7 @@ def setting(url: str, query: str, name: str, low: int, high: int, usual: int) ->
 
 
 def nothing_more(url: str, parts: SplitResult, usage: str, *, path: bool = False) -> None:
-    """Refuse what stands after the port."""
+    """Raise a UsageError if anything follows the port, except a path if ``path`` is set."""
     if parts.query or parts.fragment or (parts.path not in ("", "/") and not path):
         raise UsageError(
             f"--to {without_password(url)}: nothing may follow the port; write  {usage}"
@@ -123,5 +133,5 @@ def nothing_more(url: str, parts: SplitResult, usage: str, *, path: bool = False
 
 
 def or_nan(value: float | None) -> float:
-    """NaN for what is not known."""
+    """Return ``value``, or NaN if it is None."""
     return math.nan if value is None else value

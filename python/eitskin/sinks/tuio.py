@@ -1,9 +1,10 @@
-"""``tuio://HOST[:3333]``: TUIO 1.1, profile /tuio/2Dcur, over UDP, for multi-touch programs.
+"""``tuio://HOST[:3333]``: send TUIO 1.1, profile /tuio/2Dcur, over UDP to multi-touch programs.
 
-A bundle a frame: source, alive with all ids, a set for each touch (x and y of the skin's bounding
-box, 0 to 1, y downwards as TUIO has it; speed in boxes a second, acceleration in boxes a second
-squared), fseq. Of ``--report drive`` a bundle a drive, with its ids and speeds; of a frame without
-reports, and after the last, one with no touch.
+Each frame gives a bundle: source, alive with all ids, a set per touch, and fseq. x and y of a set
+are relative to the skin's bounding box, 0 to 1, y downwards as TUIO defines it; the speed is in
+boxes per second, the acceleration in boxes per second squared. With ``--report drive`` each drive
+gives a bundle with its ids and speeds. A frame without reports after it, and the end of the stream,
+give a bundle without touches.
 """
 
 import math
@@ -18,11 +19,11 @@ from eitskin.sinks.udp import connected, send
 USAGE = "tuio://HOST or tuio://HOST:PORT"
 PORT = 3333
 PATH = "/tuio/2Dcur"
-State = tuple[float, float, float, float, float]  # x, y, their speeds, the speed's change
+State = tuple[float, float, float, float, float]  # x, y, their speeds, the acceleration
 
 
 class Cursors:
-    """TUIO messages of frames, one after another."""
+    """Turns touches of successive frames into TUIO messages."""
 
     def __init__(self, box_mm: Box, name: str) -> None:
         self._box, self._name = box_mm, name
@@ -30,7 +31,7 @@ class Cursors:
         self._before: dict[int, State] = {}
 
     def messages(self, touches: list[dict[str, Any]], time_s: float) -> list[tuple[str, list[Any]]]:
-        """Of the touches at ``time_s``, of a frame or after a drive."""
+        """Return the messages for the touches at ``time_s``, of a frame or after a drive."""
         self._frame += 1
         elapsed_s, self._time_s = time_s - self._time_s, time_s
         now = {t["id"]: self._state(t, elapsed_s) for t in touches}
@@ -47,7 +48,7 @@ class Cursors:
 
     @property
     def some(self) -> bool:
-        """Whether there were touches last."""
+        """Whether the last messages had touches."""
         return bool(self._before)
 
     def _state(self, touch: dict[str, Any], elapsed_s: float) -> State:
@@ -69,7 +70,7 @@ class Cursors:
 
 
 class TuioSink:
-    """A datagram a frame, or a drive where those are reported."""
+    """A socket that sends a datagram per frame, or per drive if drives are reported."""
 
     def __init__(self, target: socket.socket, cursors: Cursors) -> None:
         self._socket, self._cursors, self._time_s = target, cursors, 0.0
@@ -83,7 +84,8 @@ class TuioSink:
         if message["type"] == "report":
             self._reported = message["frame"]
         elif message["type"] == "frame" and self._reported is not None:
-            # While there are touches, every drive reports: now there is none, lost packets or not.
+            # While there are touches, every drive reports. A frame after the last report has none,
+            # even if packets were lost.
             if message["frame"] <= self._reported:
                 return
             touches = []
@@ -91,7 +93,7 @@ class TuioSink:
         send(self._socket, bundle(self._cursors.messages(touches, self._time_s)))
 
     def close(self) -> None:
-        if self._cursors.some:  # the stream was cut short: nobody touches any more
+        if self._cursors.some:  # the stream was interrupted: end all touches
             self._socket.send(bundle(self._cursors.messages([], self._time_s)))
         self._socket.close()
 
@@ -102,8 +104,8 @@ def open_sink(url: str, source: TouchSource) -> Sink:
     need_osc("tuio")
     if source.box_mm is None:
         raise SinkError(
-            f"--to {url}: TUIO's places are of the skin's bounding box, which the board's model"
-            " tells; name its file with  --model FILE"
+            f"--to {url}: TUIO needs the skin's bounding box, which is in the board's model; name"
+            " its file with  --model FILE"
         )
     name = f"eitskin@{socket.gethostname()}"
     return TuioSink(connected(url, host, port), Cursors(source.box_mm, name))

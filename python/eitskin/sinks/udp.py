@@ -1,4 +1,4 @@
-"""``udp://HOST:PORT``: each message as a datagram of JSON."""
+"""``udp://HOST:PORT``: send each message as a datagram of JSON."""
 
 import socket
 
@@ -9,7 +9,8 @@ USAGE = "udp://HOST:PORT"
 
 
 class UdpSink:
-    """A datagram a message. Nobody need listen; what a datagram cannot hold fails."""
+    """A socket that sends a datagram per message. Nobody needs to listen; a message that is too
+    long for a datagram fails."""
 
     def __init__(self, target: socket.socket) -> None:
         self._socket = target
@@ -28,15 +29,19 @@ def open_sink(url: str, source: TouchSource) -> Sink:
 
 
 def send(target: socket.socket, data: bytes) -> None:
-    """One datagram; nobody need listen."""
+    """Send a datagram; nobody needs to listen."""
     try:
         target.send(data)
-    except ConnectionRefusedError:  # of a datagram before: nobody listens on this machine
+    except ConnectionRefusedError:  # caused by an earlier datagram: nobody listens on this machine
         target.send(data)
 
 
 def connected(url: str, host: str, port: int) -> socket.socket:
-    """A socket that sends datagrams there."""
+    """Return a socket that sends datagrams to ``host`` and ``port``.
+
+    Raises:
+        SinkError: the host is unknown or cannot be reached.
+    """
     try:
         kind, _, _, _, target = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         opened = socket.socket(kind, socket.SOCK_DGRAM)

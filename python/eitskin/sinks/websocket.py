@@ -1,7 +1,7 @@
-"""``ws://HOST:PORT``: a WebSocket server that any number of clients connect to; each gets every
-message as a text of JSON.
+"""``ws://HOST:PORT``: start a WebSocket server that any number of clients connect to; each receives
+every message as a JSON text.
 
-Pages of this machine and programs may connect; a page that another host served may not.
+Programs and pages of this machine may connect; a page that another host served may not.
 """
 
 import asyncio
@@ -16,15 +16,15 @@ from eitskin.errors import SinkError, missing_extra
 from eitskin.sinks.sink import Dropped, OutgoingMessage, Sink, TouchSource, address, nothing_more
 
 USAGE = "ws://127.0.0.1:PORT, where clients connect"
-FULL_BYTES = 1 << 20  # unsent of a client: it is left out until it has read
+FULL_BYTES = 1 << 20  # unsent bytes of a client, above which it gets no messages until it has read
 LOCAL = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
 
 
 class WebSocketSink:
-    """Clients come and go; one that does not read is left out.
+    """A WebSocket server. Clients that do not read are left out.
 
     Raises:
-        SinkError: the port is taken, or the host is not this machine's.
+        SinkError: the port is taken, or the host is not this machine.
         MissingExtraError: websockets is not installed.
     """
 
@@ -85,14 +85,14 @@ class WebSocketSink:
         self._clients.add(client)
         try:
             async for _ in client:
-                pass  # whatever it says
-        except Exception:  # it went away without a word
+                pass  # messages of clients are ignored
+        except Exception:  # it closed without a close message
             pass
         finally:
             self._clients.discard(client)
 
     async def _send(self, text: str) -> bool:
-        """To all who read; False where somebody was left out."""
+        """Send ``text`` to all clients that read; return False if a client was left out."""
         from websockets.asyncio.server import broadcast
 
         reading = [

@@ -1,2 +1,2 @@
-"""What a skin is: its outline, its electrodes, and the order in which they are driven and
-measured."""
+"""The description of a skin: its outline, its electrodes, and the order in which they are driven
+and measured."""

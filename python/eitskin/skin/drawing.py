@@ -1,7 +1,7 @@
-"""Outlines and electrodes out of a drawing, SVG or DXF: shapes in mm with y up, of which one is the
-skin's rim.
+"""Read the outline and the electrodes of a skin from an SVG or DXF drawing.
 
-A skin keeps the polygon and the places only: nothing depends on the drawing once it is read.
+Shapes are in mm with y up; one of them is the skin's rim. A skin keeps only the polygon and the
+places: nothing depends on the drawing once it has been read.
 """
 
 import math
@@ -21,19 +21,23 @@ from eitskin.skin.drawing_shapes import DrawingReading, DrawnShape
 from eitskin.skin.outline import Outline, polygon
 
 MAX_BYTES = 2_000_000
-JOIN_MM = 0.01  # ends nearer than that are one point
+JOIN_MM = 0.01  # two ends of lines that are closer than this are the same point
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """What a file draws; ``where`` names it in errors."""
+    """The shapes that a file draws; ``where`` names the file in errors."""
 
     where: str
     shapes: tuple[DrawnShape, ...]
 
     def marked(self, mark: str) -> tuple[DrawnShape, ...]:
-        """The shapes that ``mark`` names by id, class, layer or group, or whose id is ``mark`` and
-        a number, in any order."""
+        """Return the shapes that ``mark`` names by id, class, layer or group, and those whose id is
+        ``mark`` followed by a number, in any order.
+
+        Raises:
+            ConfigError: no shape has this mark.
+        """
         numbered = re.compile(re.escape(mark) + r"[ _.-]?\d+")
         found = tuple(
             one for one in self.shapes if mark in one.names or numbered.fullmatch(one.name)
@@ -43,7 +47,14 @@ class Drawing:
         return found
 
     def outline(self, element: str | None = None, mark: str | None = None) -> Outline:
-        """The one closed outline of those that ``element`` names and that ``mark`` does not."""
+        """Return the only closed outline among the shapes named ``element`` (None: all shapes) that
+        do not carry ``mark``.
+
+        Raises:
+            ConfigError: nothing is named ``element`` or marked ``mark``.
+            GeometryError: there is no closed outline or more than one, or it is not a valid
+                polygon.
+        """
         marks = {id(one) for one in self.marked(mark)} if mark is not None else set()
         shapes = [one for one in self.shapes if id(one) not in marks]
         if element is not None:
@@ -72,11 +83,11 @@ class Drawing:
 
 
 def read_drawing(path: Path, reading: DrawingReading) -> Drawing:
-    """The drawing in the file ``path``, SVG or DXF by its ending.
+    """Read the drawing in the file ``path``; the ending .svg or .dxf gives its format.
 
     Raises:
-        FileError: it cannot be read.
-        ConfigError: it is of another kind, damaged, or does not say how large it is.
+        FileError: the file cannot be read.
+        ConfigError: the file has another format, is damaged, or does not state its scale.
         MissingExtraError: the library that parses it is not installed.
     """
     kind = path.suffix.lower()
@@ -94,16 +105,16 @@ def read_drawing(path: Path, reading: DrawingReading) -> Drawing:
 
 
 def joined(open_shapes: Sequence[DrawnShape]) -> list[DrawnShape]:
-    """Closed shapes made of open ones whose ends meet, two at each joint; what does not close is
-    left out."""
+    """Join open shapes at ends that meet, and return the closed shapes. A joint takes exactly two
+    ends; shapes that do not close are left out."""
     left = {k: one for k, one in enumerate(open_shapes) if len(one.points_mm) > 1}
     ends, closed = _Ends(left), []
     while left:
         first = next(reversed(left))
         chain, names = left.pop(first).points_mm, []
         while not _meet(chain[0], chain[-1]):
-            at_it = (found for found in ends.near(chain[-1]) if found[0] in left)
-            found = list(islice(at_it, 2))
+            unused = (found for found in ends.near(chain[-1]) if found[0] in left)
+            found = list(islice(unused, 2))
             if len(found) != 1:
                 break
             k, end = found[0]
@@ -119,7 +130,7 @@ def joined(open_shapes: Sequence[DrawnShape]) -> list[DrawnShape]:
 
 
 class _Ends:
-    """The ends of lines by place, in cells of ``JOIN_MM``."""
+    """The ends of lines, sorted by position into cells of ``JOIN_MM``."""
 
     def __init__(self, lines: Mapping[int, DrawnShape]) -> None:
         self._cells: dict[tuple[int, int], list[tuple[int, int, FloatArray]]] = {}
@@ -130,7 +141,7 @@ class _Ends:
                     self._cells.setdefault(_cell(point), []).append((k, end, point))
 
     def near(self, point: FloatArray) -> Iterator[tuple[int, int]]:
-        """Number and end (0, -1) of each line that ends at ``point``."""
+        """Yield the number of each line that ends at ``point``, and which end it is (0 or -1)."""
         if not np.isfinite(point).all():
             return
         column, row = _cell(point)
@@ -149,8 +160,8 @@ def _meet(a: FloatArray, b: FloatArray) -> bool:
 
 
 def _without_repeats(points_mm: FloatArray) -> FloatArray:
-    """``points_mm`` without those that lie next to nothing beside the one before: joints of a
-    drawing's pieces."""
+    """Return ``points_mm`` without points that almost coincide with the one before, as the joints
+    of a drawing's pieces do."""
     size = float(np.ptp(points_mm, axis=0).max())
     if not (np.isfinite(points_mm).all() and size > 0):
         return points_mm

@@ -1,5 +1,5 @@
-"""DXF by ezdxf: lines, polylines, arcs, circles, ellipses, splines and points of the model space,
-in mm."""
+"""Read DXF files with ezdxf: lines, polylines, arcs, circles, ellipses, splines and points of the
+model space, in mm."""
 
 import io
 import logging
@@ -27,17 +27,18 @@ try:
 except ModuleNotFoundError as error:
     raise missing_extra("drawing", "ezdxf") from error
 
-# the header's $INSUNITS: inches, feet, millimetres, centimetres, metres, mils, micrometres,
+# values of $INSUNITS in the header: inches, feet, millimetres, centimetres, metres, mils,
+# micrometres,
 # decimetres
 UNITS_MM = {1: 25.4, 2: 304.8, 4: 1.0, 5: 10.0, 6: 1000.0, 9: 0.0254, 13: 1e-3, 14: 100.0}
 DRAWN = {"LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"}
 
 
 def read_dxf(content: bytes, where: str, reading: DrawingReading) -> list[DrawnShape]:
-    """Every line and point of the DXF file ``content``; blocks are taken apart."""
+    """Return every line and point of the DXF file ``content``; blocks are expanded."""
     talk = logging.getLogger("ezdxf")
     before = talk.level
-    talk.setLevel(logging.CRITICAL)  # what it repairs in a file is no news to the user
+    talk.setLevel(logging.CRITICAL)  # the user need not see what ezdxf repairs in a file
     try:
         document, _ = ezdxf.recover.read(io.BytesIO(content))
         scale = reading.scale_mm or _scale_of(document, where)
@@ -49,7 +50,7 @@ def read_dxf(content: bytes, where: str, reading: DrawingReading) -> list[DrawnS
         )
     except EitskinError:
         raise
-    except Exception as error:  # the reader meets damage with many kinds of errors
+    except Exception as error:  # ezdxf raises many kinds of errors for a damaged file
         raise ConfigError(
             f"{where}: cannot be read as DXF ({type(error).__name__}: {error}); export it again"
         ) from None
@@ -61,15 +62,15 @@ def _scale_of(document: Any, where: str) -> float:
     unit = document.header.get("$INSUNITS", 0)
     if unit not in UNITS_MM:
         raise ConfigError(
-            f"{where}: $INSUNITS = {unit} is no unit of length; give scale_mm, mm a unit of the"
-            " drawing"
+            f"{where}: $INSUNITS = {unit} is not a unit of length; give scale_mm, the mm per unit"
+            " of the drawing"
         )
     return UNITS_MM[unit]
 
 
 def _refuse_copies(document: Any, where: str) -> None:
-    """Refuse blocks that insert each other in circles, and more copies than a drawing needs, before
-    any is made."""
+    """Refuse blocks that insert each other in a circle, and drawings with more copies than any
+    outline needs, before a copy is made."""
     counts: dict[str, int] = {}
 
     def count(layout: Any, depth: int) -> int:

@@ -1,4 +1,4 @@
-"""The shapes of a drawing, in mm with y up, and how its curves become straight pieces."""
+"""The shapes of a drawing, in mm with y up, and the conversion of curves to straight pieces."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -12,18 +12,18 @@ from eitskin.errors import ConfigError
 
 TOLERANCE_MM = 0.1
 MAX_SHAPES = 20_000
-MAX_DEPTH = 100  # groups or blocks within each other
+MAX_DEPTH = 100  # limit of nested groups or blocks
 MAX_PIECES = 2_000
-MAX_POINTS = 30_000  # of all shapes, curves flattened
+MAX_POINTS = 30_000  # limit for all shapes together, after curves are flattened
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnShape:
-    """One line of a drawing: ``points_mm`` (k, 2), y up, curves flattened; a closed one's last
-    point is not its first.
+    """One line of a drawing: ``points_mm`` (k, 2) with y up and curves flattened. The last point of
+    a closed shape does not repeat the first.
 
-    ``name`` is its own id, empty for none; ``names`` also has its classes, its layer, and what the
-    groups around it are called.
+    ``name`` is the shape's own id, or empty; ``names`` also holds its classes, its layer, and the
+    names of the groups around it.
     """
 
     name: str
@@ -33,24 +33,29 @@ class DrawnShape:
 
     @property
     def middle_mm(self) -> FloatArray:
-        """The middle of its bounding box, (2,)."""
+        """The middle of the bounding box, (2,)."""
         return np.asarray((self.points_mm.min(axis=0) + self.points_mm.max(axis=0)) / 2)
 
 
 @dataclass(frozen=True)
 class DrawingReading:
-    """How a drawing is read: mm a unit of the drawing (None: the file's own units), and how far a
-    flattened curve may be from the true one."""
+    """Options for reading a drawing: ``scale_mm`` is mm per unit of the drawing (None: the file's
+    own units), and ``tolerance_mm`` is how far a flattened curve may be from the true one."""
 
     scale_mm: float | None = None
     tolerance_mm: float = TOLERANCE_MM
 
 
 class TooManyPoints(Exception):
-    """Over ``MAX_POINTS``."""
+    """Raised when the shapes have more than ``MAX_POINTS`` points."""
 
 
 def limited(shapes: Iterable[DrawnShape], where: str) -> list[DrawnShape]:
+    """Return ``shapes`` as a list, once they are known to have at most ``MAX_POINTS`` points.
+
+    Raises:
+        ConfigError: they have more points.
+    """
     found, points = [], 0
     try:
         for one in shapes:
@@ -69,16 +74,16 @@ def limited(shapes: Iterable[DrawnShape], where: str) -> list[DrawnShape]:
 def flattened(
     point_at: Callable[[float], tuple[float, float]], pieces: float
 ) -> list[tuple[float, float]]:
-    """A curve's points after its first, for its parameter from 0 to 1 in about so many
-    ``pieces``."""
+    """Return the points of a curve after its first, at equal steps of its parameter from 0 to 1, in
+    about ``pieces`` pieces."""
     count = min(max(1, math.ceil(pieces)), MAX_PIECES) if math.isfinite(pieces) else 1
     return [point_at((k + 1) / count) for k in range(count)]
 
 
 def bezier_pieces(controls: npt.ArrayLike, tolerance: float) -> float:
-    """How many straight pieces keep a Bezier curve of degree d with ``controls`` (d + 1, 2) within
-    ``tolerance``: the bound by second differences, sqrt(d (d - 1) max|P_i - 2 P_i+1 + P_i+2| / (8
-    tolerance))."""
+    """Return how many straight pieces keep a Bezier curve of degree d with ``controls`` (d + 1, 2)
+    within ``tolerance``. The bound by second differences is sqrt(d (d - 1) max|P_i - 2 P_i+1 +
+    P_i+2| / (8 tolerance))."""
     bent = np.diff(np.asarray(controls, dtype=np.float64), n=2, axis=0)
     degree = len(bent) + 1
     return math.sqrt(
@@ -87,7 +92,7 @@ def bezier_pieces(controls: npt.ArrayLike, tolerance: float) -> float:
 
 
 def arc_pieces(radius: float, sweep_rad: float, tolerance: float) -> float:
-    """The same for an arc: a chord over an angle a lies radius (1 - cos(a / 2)) from it; at least 6
-    a turn."""
+    """Return how many straight pieces keep an arc within ``tolerance``, at least 6 per turn: a
+    chord over an angle a deviates from the arc by radius (1 - cos(a / 2))."""
     share = min(max(tolerance / radius, 1e-9), 0.5) if radius > 0 else 0.5
     return abs(sweep_rad) / (2 * math.acos(1 - share))

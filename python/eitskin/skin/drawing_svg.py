@@ -1,5 +1,5 @@
-"""SVG by svgelements: shapes with their transforms, in mm, y up. (0, 0) is the page's lower left
-corner."""
+"""Read SVG files with svgelements: shapes with their transforms, in mm with y up. (0, 0) is the
+lower left corner of the page."""
 
 import io
 import math
@@ -32,10 +32,11 @@ except ModuleNotFoundError as error:
 
 MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
 MM_A_PIXEL = 25.4 / 96
-MAX_STYLE = 10_000  # characters of style sheets, and of styles
-WORKED = ("d", "points", "transform")  # attributes whose work grows with their words
+MAX_STYLE = 10_000  # characters of all style sheets and style attributes, per 20 elements
+WORKED = ("d", "points", "transform")  # attributes that take longer to parse the longer they are
 WORD = re.compile(r"[A-Za-z]|[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-# A closing without a move after it: the parser looks back for where the path began.
+# After a closing command without a move the parser searches backwards for the start of the path,
+# which is slow: it counts as LOOSE_WORDS words.
 LOOSE, LOOSE_WORDS = re.compile(r"[zZ](?!\s*(?:[mM]|$))"), 400
 MAX_WORDS = 40_000
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
@@ -43,7 +44,8 @@ LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 @dataclass(frozen=True)
 class SvgPage:
-    """mm a user unit, and the user coordinates of the page's left and lower edge."""
+    """The scale in mm per user unit, and the user coordinates of the page's left and lower
+    edges."""
 
     scale_mm: float
     left: float
@@ -51,7 +53,7 @@ class SvgPage:
 
 
 def read_svg(content: bytes, where: str, reading: DrawingReading) -> list[DrawnShape]:
-    """Every shape of the SVG file ``content``."""
+    """Return every shape of the SVG file ``content``."""
     try:
         root = ET.fromstring(content)
     except (ET.ParseError, ValueError, LookupError) as error:
@@ -69,7 +71,7 @@ def read_svg(content: bytes, where: str, reading: DrawingReading) -> list[DrawnS
         return limited(_shapes(tree, frozenset(), page, reading.tolerance_mm), where)
     except EitskinError:
         raise
-    except Exception as error:  # the parser has none of its own: whatever a damaged file meets
+    except Exception as error:  # the parser defines no error type; damage raises many kinds
         raise ConfigError(
             f"{where}: cannot be read as SVG ({type(error).__name__}: {error}); export it again"
         ) from None
@@ -111,16 +113,17 @@ def _page(root: ET.Element, where: str, reading: DrawingReading) -> SvgPage:
 
 
 def _length_mm(text: str | None) -> float | None:
-    """A length with a physical unit, in mm; None for any other."""
+    """Return a length with a physical unit in mm, or None for any other text."""
     found = re.fullmatch(r"\s*\+?(\d*\.?\d+(?:[eE][+-]?\d+)?)\s*([a-zA-Z]+)\s*", text or "")
     value = float(found[1]) * MM.get(found[2].lower(), 0.0) if found else 0.0
     return value if math.isfinite(value) and value > 0 else None
 
 
 def _refuse_copies(root: ET.Element, where: str) -> None:
-    """Refuse <use> in circles, and copies of copies that would never end."""
+    """Refuse <use> elements that refer to each other in a circle, and more copies of copies than
+    could be parsed in reasonable time."""
     by_id = {one.get("id"): one for one in root.iter() if one.get("id")}
-    counts: dict[int, tuple[int, int]] = {}  # elements, and words of their paths
+    counts: dict[int, tuple[int, int]] = {}  # number of elements, and of words in their paths
 
     def count(one: ET.Element, depth: int) -> tuple[int, int]:
         if depth > MAX_DEPTH:
@@ -180,7 +183,7 @@ def _shapes(
 
 
 def _runs(path: Any, tolerance: float) -> Iterator[list[tuple[float, float]]]:
-    """The subpaths as points, flattened; a closed one ends on its first point."""
+    """Yield each subpath as flattened points; a closed one ends on its first point."""
     run: list[tuple[float, float]] = []
     for piece in path:
         if isinstance(piece, svgelements.Move):
@@ -208,7 +211,7 @@ def _controls(piece: Any) -> list[Any]:
 
 
 def _along(piece: Any) -> Callable[[float], tuple[float, float]]:
-    """The point of a curve at its parameter."""
+    """Return the function that maps the parameter of a curve to its point."""
     return lambda t: _pair(piece.point(t))
 
 

@@ -1,10 +1,11 @@
-"""EIDORS' forward models, read from .mat files: a sheet's rim, electrodes and protocol.
+"""Read EIDORS' forward models from .mat files: the rim, electrodes and protocol of a
+two-dimensional model.
 
 The fields are those that EIDORS 3 itself reads (fwd_model_parameters.m, system_mat_fields.m,
 stim_meas_list.m): ``nodes`` (N, 2), ``elems`` (E, 3) from 1, ``electrode(k).nodes`` and
 ``.z_contact``, ``stimulation(d).stim_pattern`` (L, 1) and ``.meas_pattern`` (rows, L). Nodes are
-taken for metres. A model of triangles conducts in its plane: its elem_data are conductivity times
-thickness, in S, and z_contact is in ohm m.
+assumed to be in metres. A model of triangles conducts in its plane: its elem_data are conductivity
+times thickness, in S, and z_contact is in ohm m.
 """
 
 from collections.abc import Mapping
@@ -19,16 +20,20 @@ from eitskin.errors import FileError, GeometryError, ProtocolError
 from eitskin.fileio import read_mat
 from eitskin.skin.outline import Outline, disk, polygon
 
-ROUND = 1e-3  # of the radius: as far may a disk's rim nodes be from a circle
-UNKNOWN_THICKNESS_MM = 1000.0  # conductivity in S/m is then EIDORS' number
+ROUND = 1e-3  # the radii of rim nodes may differ by this part of the mean if the rim is a circle
+UNKNOWN_THICKNESS_MM = 1000.0  # with 1 m, the conductivity in S/m equals EIDORS' number
 
 
 @dataclass(frozen=True, eq=False)
 class EidorsModel:
-    """A forward model: ``nodes_mm`` (N, 2) as in the file, ``triangles`` (E, 3) from 0, nodes of
-    each electrode, contact impedances (L,) in ohm m; rows [I+, I-, V+, V-] (m, 4) from 0, their
-    current, and the factor ``gain`` that their voltages carry; the sheet's conductance in S.
-    ``jacobian`` (m, E) in V/S where the file holds numbers of that shape."""
+    """An EIDORS forward model.
+
+    ``nodes_mm`` (N, 2) are as in the file and ``triangles`` (E, 3) count from 0. Each electrode has
+    its nodes and a contact impedance (L,) in ohm m. ``rows`` (m, 4) are [I+, I-, V+, V-] from 0,
+    driven with ``current_a``; their voltages carry the factor ``gain``. ``sheet_s`` is the
+    conductance of the sheet in S. ``jacobian`` is (m, E) in V/S if the file holds an array of that
+    shape.
+    """
 
     name: str
     nodes_mm: FloatArray
@@ -43,7 +48,11 @@ class EidorsModel:
     jacobian: FloatArray | None
 
     def rim(self) -> IntArray:
-        """The rim's nodes in order, counterclockwise, (k,)."""
+        """Return the nodes of the rim, counterclockwise, (k,).
+
+        Raises:
+            GeometryError: the triangles have more than one rim.
+        """
         edges = self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         n = len(self.nodes_mm)
         codes = edges @ [n, 1]
@@ -61,7 +70,8 @@ class EidorsModel:
         return np.array(rim)
 
     def outline(self) -> tuple[Outline, FloatArray]:
-        """The rim as an outline, and where its origin lies among ``nodes_mm``, (2,)."""
+        """Return the rim as an outline, and the position of its origin in the coordinates of
+        ``nodes_mm``, (2,)."""
         rim = self.nodes_mm[self.rim()]
         centre = (rim.min(axis=0) + rim.max(axis=0)) / 2
         radii = np.linalg.norm(rim - centre, axis=1)
@@ -70,8 +80,12 @@ class EidorsModel:
         return polygon(rim.tolist()), np.zeros(2)
 
     def contacts(self) -> tuple[FloatArray, float]:
-        """The middle of each electrode on the rim of ``nodes_mm``, (L, 2), and their mean width. A
-        single node stands for half of the edges beside it, as in EIDORS."""
+        """Return the middle of each electrode on the rim, in the coordinates of ``nodes_mm`` (L,
+        2), and the mean width. As in EIDORS, a single node covers half of each edge beside it.
+
+        Raises:
+            GeometryError: an electrode is not on the rim.
+        """
         rim = self.rim()
         place = {int(node): k for k, node in enumerate(rim)}
         points = self.nodes_mm[rim]
@@ -81,7 +95,7 @@ class EidorsModel:
             if not len(nodes) or any(int(node) not in place for node in nodes):
                 raise GeometryError(
                     f"EIDORS model {self.name!r}: electrode {number + 1} is not on the rim of the"
-                    " sheet; eitskin's electrodes are"
+                    " model, where eitskin needs it"
                 )
             at = np.sort([place[int(node)] for node in nodes])
             gaps = np.diff(np.append(at, at[0] + len(rim)))
@@ -101,12 +115,13 @@ class EidorsModel:
 
 
 def read_eidors(path: str | Path) -> EidorsModel:
-    """The forward model in a .mat file: the first struct with nodes, elems, electrode and
-    stimulation, alone or in an image or inverse model.
+    """Read the forward model in a .mat file: the first struct with nodes, elems, electrode and
+    stimulation, either by itself or within an image or inverse model.
 
     Raises:
-        FileError: the file cannot be read, or holds none.
-        GeometryError, ProtocolError: what it describes is no sheet, or no scan of pairs.
+        FileError: the file cannot be read, or holds no such model.
+        GeometryError, ProtocolError: it is not a two-dimensional model, or its patterns are not
+            pairs.
         MissingExtraError: scipy is not installed.
     """
     content = read_mat(path)
@@ -127,7 +142,7 @@ def read_eidors(path: str | Path) -> EidorsModel:
 
 
 def find_model(content: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """The first struct of ``content`` that is a forward model; None where there is none."""
+    """Return the first struct in ``content`` that is a forward model, or None."""
     if all(name in content for name in ("nodes", "elems", "electrode", "stimulation")):
         return content
     inner = [value for value in content.values() if isinstance(value, Mapping)]
@@ -168,7 +183,8 @@ def _model(content: Mapping[str, Any], model: Mapping[str, Any]) -> EidorsModel:
 
 
 def _structs(value: Any) -> list[Mapping[str, Any]]:
-    """A struct array as scipy gives it: one struct, or a list or array of them."""
+    """Return the structs of a struct array, for which scipy gives one struct, or a list or array of
+    them."""
     return [value] if isinstance(value, Mapping) else list(np.asarray(value, object).ravel())
 
 
@@ -177,7 +193,7 @@ def _dense(value: Any) -> FloatArray:
 
 
 def _scan(stimulation: list[Mapping[str, Any]], n_electrodes: int) -> tuple[IntArray, float, float]:
-    """Rows (m, 4) from 0, current in A, gain of the patterns."""
+    """Return the rows (m, 4) from 0, the current in A, and the gain of the patterns."""
     rows, currents, gains = [], [], []
     for k, one in enumerate(stimulation, 1):
         drive, current = _pair(_dense(one["stim_pattern"]).ravel(), f"stim_pattern {k}")
@@ -197,7 +213,8 @@ def _scan(stimulation: list[Mapping[str, Any]], n_electrodes: int) -> tuple[IntA
 
 
 def _pair(pattern: FloatArray, what: str) -> tuple[tuple[int, int], float]:
-    """The electrodes (+, -) of a pattern (L,) of two entries, and their size."""
+    """Return the electrodes (+, -) of a pattern (L,) with two entries, and the size of the
+    entries."""
     used = np.flatnonzero(pattern)
     if len(used) != 2 or abs(pattern.sum()) > 1e-9 * np.abs(pattern).max():
         raise ProtocolError(
@@ -208,8 +225,8 @@ def _pair(pattern: FloatArray, what: str) -> tuple[tuple[int, int], float]:
 
 
 def _background(content: Mapping[str, Any]) -> float:
-    """The sheet's conductance: an inverse model's background, a single image's mean where it is
-    above 0, or 1."""
+    """Return the sheet conductance in S: the background of an inverse model; else the mean of an
+    image if all its values are above 0; else 1."""
     for value in content.values():
         if not isinstance(value, Mapping):
             continue

@@ -1,4 +1,4 @@
-"""The electrodes at a skin's rim: how many, how wide, where, and how well they touch."""
+"""The electrodes at a skin's rim: their number, width, places and contact impedance."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -11,12 +11,12 @@ MAX_COUNT = 255
 
 @dataclass(frozen=True)
 class Electrodes:
-    """Electrodes of one width, numbered from 0 along the rim.
+    """Electrodes of equal width, numbered from 0 along the rim.
 
     The start point is where a ray from the outline's centre at ``start_angle_deg`` meets the rim.
-    Electrode centres lie at ``positions_mm`` along the rim from there in the numbering direction;
-    None spaces them evenly, electrode 0 on the start point. ``contact_impedance_ohm_m2`` is that of
-    a unit of contact area; 0 is an ideal shunt.
+    Electrode centres lie at ``positions_mm`` along the rim from there, in the numbering direction;
+    None spaces them evenly with electrode 0 at the start point. ``contact_impedance_ohm_m2`` is the
+    impedance of a unit of contact area; 0 makes an ideal shunt.
     """
 
     count: int = 16

@@ -1,4 +1,5 @@
-"""The rim, which no current crosses, mirrors the dipoles that touches are."""
+"""The mirror images that the rim adds to touches. No current crosses the rim, so it reflects the
+dipole field of a touch."""
 
 import numpy as np
 import numpy.typing as npt
@@ -8,13 +9,12 @@ from eitskin.skin.outline import Outline
 
 
 def rim_mirror(outline: Outline, points_mm: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-    """For a dipole at each of ``points_mm`` (k, 2), a and b (k,) of its mirror: with x + iy for
-    vectors, the rim adds -conj(p) / (a - b z)^2 to the conjugate field at z where the dipole p
-    itself gives p / (z - z_p)^2.
+    """Return the mirror (a, b) of a dipole at each of ``points_mm`` (k, 2), both (k,) complex.
 
-    Exact for a disk, where a = R, b = conj(z_p) / R. Of other outlines the nearest piece of the rim
-    is taken as straight: b = conj(n) of its outward normal n, a = b (z_p + 2 d n) with d the
-    distance to it.
+    With x + iy for vectors, a dipole p at z_p makes the conjugate field p / (z - z_p)^2 at z, and
+    the rim adds -conj(p) / (a - b z)^2. This is exact for a disk of radius R: a = R, b = conj(z_p)
+    / R. For other outlines the nearest piece of the rim is taken as straight: b = conj(n) with the
+    outward normal n of that piece, and a = b (z_p + 2 d n) with the distance d to it.
     """
     points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
     place = points[:, 0] + 1j * points[:, 1]
@@ -28,10 +28,10 @@ def rim_mirror(outline: Outline, points_mm: npt.ArrayLike) -> tuple[ComplexArray
     along = np.roll(start, -1) - start
     offset = place[:, None] - start[None, :]
     share = np.clip((offset * np.conj(along)).real / np.abs(along) ** 2, 0.0, 1.0)
-    away = share * along - offset  # from the place to the nearest point of each edge
+    away = share * along - offset  # vector from the place to the nearest point of each edge
     nearest = np.argmin(np.abs(away), axis=1)
     to_rim = away[np.arange(len(place)), nearest]
-    outward = -1j * along[nearest] / np.abs(along[nearest])  # of a counterclockwise rim
+    outward = -1j * along[nearest] / np.abs(along[nearest])  # the rim runs counterclockwise
     distance = np.abs(to_rim)
     inside = outline.contains(points)
     normal = np.where((distance > 1e-9) & inside, to_rim / np.maximum(distance, 1e-9), outward)

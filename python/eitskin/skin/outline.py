@@ -1,7 +1,7 @@
-"""A skin's outline: a simple polygon, or a disk whose arcs stay exact. Arc lengths run
-counterclockwise along the rim.
+"""The outline of a skin: a simple polygon, or a disk whose arcs stay exact.
 
-A disk's arc length starts at angle 0 (the point furthest right), a polygon's at its first vertex.
+Arc lengths run counterclockwise along the rim. They start at angle 0 (the rightmost point) for a
+disk, and at the first vertex for a polygon.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,11 +23,11 @@ DISK_VERTICES = 256
 
 @dataclass(frozen=True)
 class Outline:
-    """A simple polygon, counterclockwise and open (its last vertex is not its first), from ``disk``
-    or ``polygon``.
+    """A simple polygon, counterclockwise and open (the last vertex does not repeat the first). Make
+    one with ``disk`` or ``polygon``.
 
-    For a disk ``diameter_mm`` is set, the centre is (0, 0), the vertices only approximate the
-    circle, and every method answers for the exact circle.
+    A disk has ``diameter_mm`` and its centre at (0, 0). Its vertices only approximate the circle,
+    but every method calculates with the exact circle.
     """
 
     vertices_mm: tuple[tuple[float, float], ...]
@@ -39,13 +39,13 @@ class Outline:
 
     @cached_property
     def _arc(self) -> FloatArray:
-        """Arc length at each vertex and at the closing point, (k + 1,); polygons only."""
+        """The arc length at each vertex and at the closing point, (k + 1,); for polygons only."""
         steps = np.roll(self._corners, -1, axis=0) - self._corners
         return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
 
     @property
     def perimeter_mm(self) -> float:
-        """The rim's whole length."""
+        """The length of the rim."""
         return pi * self.diameter_mm if self.diameter_mm is not None else float(self._arc[-1])
 
     @property
@@ -59,7 +59,7 @@ class Outline:
 
     @property
     def bounding_box_mm(self) -> tuple[float, float, float, float]:
-        """(xmin, ymin, xmax, ymax)."""
+        """The bounding box as (xmin, ymin, xmax, ymax)."""
         if self.diameter_mm is not None:
             radius = self.diameter_mm / 2
             return (-radius, -radius, radius, radius)
@@ -68,11 +68,11 @@ class Outline:
 
     @cached_property
     def centre_mm(self) -> tuple[float, float]:
-        """The point from which angles are taken, inside the outline: the centre of area where that
-        is inside.
+        """The point inside the outline from which angles are measured.
 
-        Else, for a concave outline, the middle of the longest stretch inside at the height of the
-        centre of area.
+        It is the centre of area if that lies inside. For a concave outline whose centre of area
+        lies outside, it is the middle of the longest stretch inside the outline at the height of
+        the centre of area.
         """
         if self.diameter_mm is not None:
             return (0.0, 0.0)
@@ -90,8 +90,8 @@ class Outline:
         return (float(x), float(y))
 
     def contains(self, points: npt.ArrayLike) -> BoolArray:
-        """Whether each of ``points`` (k, 2), in mm, lies inside, (k,). On the rim itself either
-        answer may come."""
+        """Return for each of ``points`` (k, 2) in mm whether it lies inside, (k,). A point exactly
+        on the rim may count as either."""
         p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         if self.diameter_mm is not None:
             return np.asarray(p[:, 0] ** 2 + p[:, 1] ** 2 <= self.diameter_mm**2 / 4)
@@ -105,7 +105,8 @@ class Outline:
         return inside
 
     def points_at(self, arc_length_mm: npt.ArrayLike) -> FloatArray:
-        """The rim's points (k, 2) in mm at arc lengths (k,), taken modulo the perimeter."""
+        """Return the rim's points (k, 2) in mm at the arc lengths (k,), taken modulo the
+        perimeter."""
         s = np.mod(np.asarray(arc_length_mm, dtype=np.float64).ravel(), self.perimeter_mm)
         if self.diameter_mm is not None:
             radius = self.diameter_mm / 2
@@ -117,18 +118,18 @@ class Outline:
         )
 
     def point_at(self, arc_length_mm: float) -> tuple[float, float]:
-        """The rim's point (x, y) in mm at an arc length, taken modulo the perimeter."""
+        """Return the rim's point (x, y) in mm at an arc length, taken modulo the perimeter."""
         x, y = self.points_at([arc_length_mm])[0]
         return (float(x), float(y))
 
     def corner_arc_lengths_mm(self) -> FloatArray:
-        """Arc length of each of a polygon's vertices, (k,); empty for a disk, which has no
-        corners."""
+        """Return the arc length of each vertex of a polygon, (k,). A disk has no corners: the
+        result is empty."""
         return np.zeros(0) if self.diameter_mm is not None else self._arc[:-1].copy()
 
     def arc_length_at_angle(self, angle_deg: float) -> float:
-        """Where the ray from the centre at ``angle_deg`` last crosses the rim, as an arc length in
-        [0, perimeter)."""
+        """Return the arc length, in [0, perimeter), at which the ray from the centre at
+        ``angle_deg`` last crosses the rim."""
         angle = radians(angle_deg % 360.0)
         if self.diameter_mm is not None:
             return angle * self.diameter_mm / 2
@@ -151,7 +152,11 @@ class Outline:
 
 
 def disk(diameter_mm: float) -> Outline:
-    """A disk centred at (0, 0)."""
+    """Return a disk centred at (0, 0).
+
+    Raises:
+        GeometryError: the diameter is out of range.
+    """
     if not (isfinite(diameter_mm) and MIN_SIZE_MM <= diameter_mm <= MAX_SIZE_MM):
         raise GeometryError(
             f"outline: diameter_mm = {diameter_mm:g} is out of range; it must be {MIN_SIZE_MM:g} to"
@@ -165,8 +170,13 @@ def disk(diameter_mm: float) -> Outline:
 
 
 def polygon(vertices: Iterable[Sequence[float]]) -> Outline:
-    """A polygon through ``vertices`` (x, y) in mm, given either way round; a repeated closing point
-    is dropped."""
+    """Return the polygon through ``vertices`` (x, y) in mm, given in either direction; a repeated
+    closing point is dropped.
+
+    Raises:
+        GeometryError: the points are too few, too many, not finite or repeated, the polygon crosses
+            itself, or its size or area is out of range.
+    """
     points = [(float(x), float(y)) for x, y in vertices]
     if len(points) > 1 and points[0] == points[-1]:
         points.pop()
@@ -191,8 +201,7 @@ def polygon(vertices: Iterable[Sequence[float]]) -> Outline:
     area = _signed_area(corners)
     if abs(area) < 1e-3 * float(size.max()) ** 2:
         raise GeometryError(
-            f"outline: its area of {abs(area):g} mm2 is next to nothing for its size; check its"
-            " points"
+            f"outline: its area of {abs(area):g} mm2 is too small for its size; check its points"
         )
     if area < 0:
         points = points[:1] + points[:0:-1]
@@ -214,8 +223,8 @@ def _refuse_repeats(corners: FloatArray, size_mm: float) -> None:
 
 
 def _refuse_crossings(corners: FloatArray) -> None:
-    """Every pair of edges: those apart must not meet, neighbours must not fold back onto each
-    other."""
+    """Check every pair of edges: edges that are not neighbours must not meet, and neighbours must
+    not fold back onto each other."""
     count = len(corners)
     ends = np.roll(corners, -1, axis=0)
     for k in range(count):
@@ -242,7 +251,7 @@ def _refuse_crossings(corners: FloatArray) -> None:
 
 
 def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    """Sign of the turn a, b, c (last axis x, y), broadcast."""
+    """Return the sign of the turn from a via b to c (last axis x, y), broadcast."""
     return np.asarray(
         np.sign(
             (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1])

@@ -1,4 +1,4 @@
-"""Electrodes where the user says: by fractions of the rim, by points near it, by marks in a
+"""Places of electrodes as the user gives them: fractions of the rim, points near it, or marks in a
 drawing."""
 
 import re
@@ -18,15 +18,16 @@ SNAP_MM = 5.0
 
 @dataclass(frozen=True)
 class Placed:
-    """Places along the rim as ``Electrodes`` takes them: ascending from the start point in the
-    numbering direction."""
+    """Places along the rim in the form that ``Electrodes`` takes: ascending from the start point in
+    the numbering direction."""
 
     positions_mm: tuple[float, ...]
     clockwise: bool
 
 
 def by_fractions(outline: Outline, fractions: Sequence[float], clockwise: bool) -> Placed:
-    """Parts of the whole rim, from 0 to below 1, from the start point on."""
+    """Place electrodes at fractions of the rim's length, each from 0 to below 1, counted from the
+    start point."""
     for k, value in enumerate(fractions):
         if not 0 <= value < 1:
             raise GeometryError(
@@ -42,8 +43,13 @@ def by_points(
     clockwise: bool | None,
     snap_mm: float = SNAP_MM,
 ) -> Placed:
-    """The rim's points nearest to ``points_mm`` (k, 2), electrode 0 first; with ``clockwise`` None,
-    whichever way they go round."""
+    """Place electrodes at the rim's points nearest to ``points_mm`` (k, 2), electrode 0 first. If
+    ``clockwise`` is None, the points may go round in either direction.
+
+    Raises:
+        GeometryError: a point is more than ``snap_mm`` from the rim, or the points are not in order
+            along it.
+    """
     points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
     arc_mm, away_mm = nearest_on_rim(outline, points)
     worst = int(np.argmax(away_mm))
@@ -74,8 +80,12 @@ def by_marks(
     clockwise: bool | None,
     snap_mm: float = SNAP_MM,
 ) -> Placed:
-    """The middles of ``marks``, in the order of the numbers that their ids end with; where not all
-    have one, along the rim from the start point."""
+    """Place electrodes at the middles of ``marks``. If every id ends with a number, the numbers
+    give the order; otherwise the order is that along the rim from the start point.
+
+    Raises:
+        GeometryError: two marks have the same number; or as ``by_points``.
+    """
     middles = np.array([mark.middle_mm for mark in marks])
     numbers = [re.search(r"(\d+)$", mark.name) for mark in marks]
     if all(numbers):
@@ -94,8 +104,8 @@ def by_marks(
 
 
 def nearest_on_rim(outline: Outline, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Arc length of the rim's point nearest to each of ``points_mm`` (k, 2), and the distance to
-    it, (k,) each in mm."""
+    """Find the rim's point nearest to each of ``points_mm`` (k, 2): return its arc length and the
+    distance to it, both (k,) in mm."""
     points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
     if outline.diameter_mm is not None:
         radius = outline.diameter_mm / 2

@@ -1,12 +1,12 @@
-"""The scan's protocol: which pair drives the current and which pair is measured, row by row.
+"""The protocol of a scan: which pair drives the current and which pair is measured, row by row.
 
 Electrodes are numbered from 0. A row is [I+, I-, V+, V-]: the current enters at I+ and leaves at
-I-, and the boundary voltage is phi(V+) - phi(V-). By reciprocity row [V+, V-, I+, I-] has the same
-voltage; swapping a pair flips its sign.
+I-, and the boundary voltage is phi(V+) - phi(V-). By reciprocity, row [V+, V-, I+, I-] has the same
+voltage; swapping the electrodes of a pair flips the sign.
 
-Rows of one drive that stand together are a drive. Drives are measured in the order of
-``drive_order``, the rows of each as they stand; it changes when a row is measured, not its place in
-a frame.
+Consecutive rows with the same driving pair form a drive. Drives are measured in the order of
+``drive_order``, and the rows within a drive as listed. The order changes when a row is measured,
+but not its place in a frame.
 """
 
 import struct
@@ -32,8 +32,8 @@ MAX_ROWS = 0xFFFF
 
 @dataclass(frozen=True, eq=False)
 class Reciprocity:
-    """Rows that reciprocity makes one: folded row k is row ``first[k]`` and ``sign[k]`` times
-    ``second[k]`` unless -1.
+    """The rows that are equal by reciprocity. Folded row k combines row ``first[k]`` with
+    ``sign[k]`` times row ``second[k]``; a row without a partner has ``second[k]`` = -1.
 
     All three are (k,) int64; ``first`` ascends, and every row of the table is in exactly one folded
     row.
@@ -46,8 +46,8 @@ class Reciprocity:
 
 @dataclass(frozen=True, eq=False)
 class Protocol:
-    """A scan of m rows (m, 4) [I+, I-, V+, V-] with one drive current. ``drive_order`` numbers the
-    drives as they are measured; () is as they stand.
+    """A scan of m rows (m, 4) [I+, I-, V+, V-] with one drive current. ``drive_order`` lists the
+    drives in the order of measurement; () keeps the order of the table.
 
     Raises:
         ProtocolError: no rows, too many, an electrode that does not exist, a pair of one electrode,
@@ -86,7 +86,7 @@ class Protocol:
 
     @property
     def scan_rows(self) -> IntArray:
-        """The rows (m,) in the order that they are measured."""
+        """The rows (m,) in the order in which they are measured."""
         if not self.drive_order:
             return np.arange(self.n_rows)
         runs = np.split(np.arange(self.n_rows), self.drive_starts[1:])
@@ -94,7 +94,7 @@ class Protocol:
 
     @property
     def scan_places(self) -> IntArray:
-        """When each row (m,) is measured: 0 is first."""
+        """The place of each row (m,) in the order of measurement; 0 is measured first."""
         return np.argsort(self.scan_rows)
 
     @property
@@ -104,8 +104,8 @@ class Protocol:
 
     @property
     def hash(self) -> int:
-        """FNV-1a, 64 bits, over u16le n_electrodes, u16le m, then the rows' bytes. The current and
-        the order do not enter."""
+        """The 64-bit FNV-1a hash over u16le n_electrodes, u16le m, then the bytes of the rows. The
+        current and the order are not included."""
         value = 0xCBF29CE484222325
         for byte in (
             struct.pack("<HH", self.n_electrodes, self.n_rows) + self.drive_measure.tobytes()
@@ -114,8 +114,8 @@ class Protocol:
         return value
 
     def reciprocal_pairs(self) -> Reciprocity:
-        """Which rows hold the same voltage, found from the table alone: pairs swapped, flipped, or
-        repeated.
+        """Find the rows that hold the same voltage, from the table alone: pairs may be swapped,
+        flipped or repeated.
 
         Raises:
             ProtocolError: more than two rows hold the same voltage.
@@ -141,8 +141,8 @@ class Protocol:
 
 
 def adjacent(n: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
-    """Drive (d, d+1), measure every (k, k+1) that shares no electrode with it, k ascending from 0:
-    n (n - 3) rows.
+    """Return the adjacent protocol: drive (d, d+1) and measure every (k, k+1) that shares no
+    electrode with it, k ascending from 0; n (n - 3) rows.
 
     Raises:
         ProtocolError: ``n`` is out of range.
@@ -151,8 +151,8 @@ def adjacent(n: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
 
 
 def opposite(n: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
-    """Drive (d, d + n/2), measure every (k, k+1) that shares no electrode with it, k ascending from
-    0: n (n - 4) rows.
+    """Return the opposite protocol: drive (d, d + n/2) and measure every (k, k+1) that shares no
+    electrode with it, k ascending from 0; n (n - 4) rows.
 
     Raises:
         ProtocolError: ``n`` is odd, below 6 or out of range.
@@ -165,8 +165,8 @@ def opposite(n: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
 
 
 def skip(n: int, skip: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
-    """Drive and measure pairs (d, d + 1 + skip), those that share no electrode; skip = 0 is
-    adjacent.
+    """Return the skip protocol: drive and measure pairs (d, d + 1 + skip) that share no electrode;
+    skip = 0 is adjacent.
 
     Raises:
         ProtocolError: ``n`` is out of range, or the pair does not span less than half the
@@ -185,7 +185,12 @@ def skip(n: int, skip: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
 
 
 def table(n: int, rows: npt.ArrayLike, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
-    """A protocol of one's own: ``rows`` (m, 4) [I+, I-, V+, V-]."""
+    """Return a protocol with the given ``rows`` (m, 4) [I+, I-, V+, V-].
+
+    Raises:
+        ProtocolError: the rows are not valid (``Protocol``), or more than two hold the same
+            voltage.
+    """
     try:
         given = np.asarray(rows)
     except ValueError:
@@ -198,8 +203,12 @@ def table(n: int, rows: npt.ArrayLike, current_a: float = DEFAULT_CURRENT_A) -> 
 
 
 def in_order(protocol: Protocol, order: str | Iterable[int]) -> Protocol:
-    """``protocol`` with its drives measured in ``order``: their numbers; or "by k", drive k j
-    modulo their count at place j."""
+    """Return ``protocol`` with its drives measured in ``order``: either their numbers, or "by K",
+    which measures drive K j modulo their count at place j.
+
+    Raises:
+        ProtocolError: the order does not have each drive exactly once.
+    """
     if isinstance(order, str):
         drives = len(protocol.drive_starts)
         word, _, number = order.partition(" ")
@@ -214,8 +223,8 @@ def in_order(protocol: Protocol, order: str | Iterable[int]) -> Protocol:
 
 
 def protocol_from_table(toml_table: Mapping[str, Any], n_electrodes: int, where: str) -> Protocol:
-    """The protocol in a parsed TOML table; ``where`` names its source in errors. An empty table is
-    adjacent."""
+    """Return the protocol in a parsed TOML table; ``where`` names its source in errors. An empty
+    table gives the adjacent protocol."""
     check_keys(toml_table, ("kind", "skip", "table", "current_a", "order"), where)
     kind = choice(toml_table, "kind", "adjacent", KINDS, where)
     for key in ("skip", "table"):
@@ -249,8 +258,8 @@ def _checked_order(order: Any, where: str) -> str | list[int]:
 
 
 def protocol_to_table(protocol: Protocol) -> dict[str, Any]:
-    """The table from which ``protocol_from_table`` makes one with the same rows, by a kind's name
-    if it can."""
+    """Return a table from which ``protocol_from_table`` makes a protocol with the same rows; it
+    uses the name of a kind if one fits."""
     rest: dict[str, Any] = {"current_a": protocol.current_a}
     if protocol.drive_order:
         rest["order"] = list(protocol.drive_order)

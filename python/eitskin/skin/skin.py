@@ -1,4 +1,5 @@
-"""A skin: outline, electrodes, sheet. Read from TOML and written back as a table."""
+"""A skin: its outline, electrodes and conductive layer, read from TOML and written back as a
+table."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -45,8 +46,8 @@ PAPER_DIAMETER_MM = 194.0
 
 @dataclass(frozen=True)
 class Skin:
-    """A conductive sheet of one thickness with electrodes at its rim; ``uncertainty`` says how far
-    a real one may be from this, None leaves that open.
+    """A conductive sheet of constant thickness with electrodes at its rim. ``uncertainty`` states
+    how far a real skin may differ from this description; None means that nothing is stated.
 
     Raises:
         GeometryError: electrodes overlap, nearly touch (a gap below 5 % of their width) or are
@@ -68,17 +69,18 @@ class Skin:
         _refuse_overlap(self)
 
     def electrode_spans_mm(self) -> FloatArray:
-        """Arc length (counterclockwise) where each electrode starts and ends, (count, 2).
+        """Return the arc lengths (counterclockwise) at which each electrode starts and ends,
+        (count, 2).
 
-        Starts lie in [0, perimeter); an end may lie beyond the perimeter, where the electrode
-        straddles arc length 0.
+        Starts lie in [0, perimeter). The end of an electrode that straddles arc length 0 exceeds
+        the perimeter.
         """
         perimeter, half = self.outline.perimeter_mm, self.electrodes.width_mm / 2
         starts = np.mod(self._centre_arc_lengths_mm() - half, perimeter)
         return np.column_stack([starts, starts + self.electrodes.width_mm])
 
     def electrode_centres_mm(self) -> FloatArray:
-        """The rim's point in the middle of each electrode, (count, 2)."""
+        """Return the rim's point in the middle of each electrode, (count, 2)."""
         return self.outline.points_at(self._centre_arc_lengths_mm())
 
     def _centre_arc_lengths_mm(self) -> FloatArray:
@@ -114,26 +116,26 @@ def _refuse_overlap(skin: Skin) -> None:
 
 
 def size_to_paper(outline: Outline) -> float:
-    """The outline's size over the paper's: the diameter of the disk of equal area over 194 mm.
-    Lengths are scaled by it."""
+    """Return the size of the outline relative to the paper's skin: the diameter of the disk of
+    equal area over 194 mm. Default lengths are scaled by it."""
     return 2 * float(np.sqrt(outline.area_mm2 / np.pi)) / PAPER_DIAMETER_MM
 
 
 def paper_skin() -> Skin:
-    """The hydrogel skin of the paper: a disk of 194 mm, 12 mm thick, 16 electrodes of 4 mm, 0.01
-    S/m."""
+    """Return the hydrogel skin of the paper: a disk of 194 mm, 12 mm thick, with 16 electrodes of 4
+    mm and 0.01 S/m."""
     return Skin("paper", disk(PAPER_DIAMETER_MM), Electrodes())
 
 
 def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = None) -> Skin:
-    """The skin in a parsed TOML ``table`` with [skin] and [electrodes]; ``where`` names its source
-    in errors. A drawing that it names lies in ``folder``; without one (a stored model's table) none
-    is read.
+    """Return the skin in a parsed TOML ``table`` with [skin] and [electrodes]; ``where`` names its
+    source in errors. A drawing that the table names is read from ``folder``; without ``folder``, as
+    for the table of a stored model, naming a drawing is an error.
 
     Raises:
-        ConfigError: an unknown key, a wrong type or a value out of range.
-        GeometryError: outline or electrodes cannot be.
-        FileError, MissingExtraError: a drawing cannot be read.
+    ConfigError: a key is unknown, or a value has the wrong type or is out of range.
+    GeometryError: the outline or the electrodes are not possible.
+    FileError, MissingExtraError: a drawing cannot be read.
     """
     check_keys(table, ("skin", "electrodes", "protocol", "uncertainty"), where)
     sheet, place = _subtable(table, "skin", where, required=True), f"{where} [skin]"
@@ -160,13 +162,13 @@ def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = 
 
 
 def load_skin(path: str | Path) -> tuple[Skin, Protocol]:
-    """The skin and the protocol in the TOML file ``path``; without [protocol], adjacent drive and
-    measurement. A .mat file is an EIDORS model's.
+    """Return the skin and the protocol in the TOML file ``path``; without [protocol], the protocol
+    is adjacent. A .mat file is read as an EIDORS model.
 
     Raises:
         FileError: the file, or a drawing that it names, cannot be read.
-        ConfigError, GeometryError, ProtocolError: what it describes cannot be.
-        MissingExtraError: a drawing's library is not installed.
+        ConfigError, GeometryError, ProtocolError: the description is not valid.
+        MissingExtraError: the library that reads a drawing is not installed.
     """
     if Path(path).suffix.lower() == ".mat":
         return skin_of_eidors(read_eidors(path))
@@ -178,7 +180,8 @@ def load_skin(path: str | Path) -> tuple[Skin, Protocol]:
 
 
 def skin_of_eidors(model: EidorsModel) -> tuple[Skin, Protocol]:
-    """Sheet, electrodes and scan of an EIDORS ``model``; widths and contacts are their means."""
+    """Return the skin and the protocol of an EIDORS ``model``. Electrodes get the mean width and
+    the mean contact impedance."""
     outline, origin_mm = model.outline()
     middles, width_mm = model.contacts()
     default, thickness_m = Electrodes(), 1e-3 * model.thickness_mm
@@ -200,7 +203,7 @@ def skin_of_eidors(model: EidorsModel) -> tuple[Skin, Protocol]:
 
 
 def skin_to_table(skin: Skin) -> dict[str, Any]:
-    """The table from which ``skin_from_table`` makes an equal skin."""
+    """Return a table from which ``skin_from_table`` makes an equal skin."""
     outline, electrodes = skin.outline, skin.electrodes
     sheet: dict[str, Any] = {"name": skin.name}
     if outline.diameter_mm is not None:
@@ -238,7 +241,7 @@ def _subtable(
 
 
 def _drawing_of(sheet: Mapping[str, Any], where: str, folder: Path | None) -> Drawing | None:
-    """The drawing that [skin] names, if any."""
+    """Read the drawing that [skin] names, if it names one."""
     if sum(key in sheet for key in OUTLINES) != 1:
         raise ConfigError(
             f"{where}: give either diameter_mm or polygon_mm, or outline = a drawing's file"
@@ -307,19 +310,20 @@ def _places(
     start_deg: float,
     clockwise: bool,
 ) -> Placed | None:
-    """Where the electrodes are said to be; None for evenly."""
-    said = [key for key in PLACES if key in table]
-    if len(said) > 1:
+    """Return the places of the electrodes as the table gives them, or None if they are evenly
+    spaced."""
+    given = [key for key in PLACES if key in table]
+    if len(given) > 1:
         raise ConfigError(
-            f"{where}: {said[0]} and {said[1]} both say where electrodes are; keep one"
+            f"{where}: {given[0]} and {given[1]} both say where electrodes are; keep one"
         )
-    if "snap_mm" in table and said not in (["points_mm"], ["marked"]):
+    if "snap_mm" in table and given not in (["points_mm"], ["marked"]):
         raise ConfigError(f"{where}: snap_mm goes with points_mm or marked; remove it")
-    if not said:
+    if not given:
         return None
     snap = number(table, "snap_mm", SNAP_MM, where, low=0, high=MAX_SIZE_MM)
     way = clockwise if "direction" in table else None
-    if said == ["marked"]:
+    if given == ["marked"]:
         mark = _word(table, "marked", where)
         if drawing is None or mark is None:
             raise ConfigError(
@@ -327,15 +331,15 @@ def _places(
                 " file"
             )
         return by_marks(outline, drawing.marked(mark), start_deg, way, snap)
-    if said == ["points_mm"]:
+    if given == ["points_mm"]:
         points = _points(table, "points_mm", where)
         if not points:
             raise ConfigError(f"{where}: points_mm is empty; give [x, y] for each electrode")
         return by_points(outline, points, start_deg, way, snap)
-    values = table[said[0]]
+    values = table[given[0]]
     if not (isinstance(values, list) and all(_is_number(value) for value in values)):
-        raise ConfigError(f"{where}: {said[0]} must be a list of numbers")
-    if said == ["fractions"]:
+        raise ConfigError(f"{where}: {given[0]} must be a list of numbers")
+    if given == ["fractions"]:
         return by_fractions(outline, values, clockwise)
     return Placed(tuple(float(value) for value in values), clockwise)
 
@@ -358,7 +362,7 @@ def _points(table: Mapping[str, Any], key: str, where: str) -> list[list[float]]
 
 
 def _is_number(value: object) -> bool:
-    """Whether it is a number that a float can hold, and no truth value."""
+    """Return whether ``value`` is a number that a float can hold; truth values do not count."""
     return isinstance(value, float) or (
         isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
     )

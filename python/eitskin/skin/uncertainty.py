@@ -1,6 +1,6 @@
-"""How far a real skin may be from its description: the table [uncertainty] of a skin's file.
+"""The table [uncertainty] of a skin's file: how far a real skin may differ from its description.
 
-Lengths are in parts of the skin's radius R, the radius of the disk of equal area.
+Lengths are fractions of the skin's radius R, the radius of the disk of equal area.
 """
 
 from collections.abc import Mapping
@@ -18,16 +18,19 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """What random skins and touches are drawn from (``model.model_errors``).
+    """The distributions from which random skins and touches are drawn (``model.model_errors``).
 
-    ``electrode_position_sd``: along the rim, in R. ``electrode_width_log_sd``, ``contact_log_sd``:
-    of the logarithms of width and contact impedance. ``out_of_round``: two to four waves along the
-    rim, together as strong as one of this amplitude in R. ``background_log_sd``: of the logarithm
-    of conductivity, a smooth field of ``background_length`` in R. ``drift_log_sd``: the same of
-    what changes after the tare. Touches are discs of ``touch_radius`` in R and ``touch_contrast``;
-    ``touch_shapes`` is the weight of shaped ones, up to ``touch_aspect_max`` times as long as wide.
-    ``row_gains``: each row is scaled to the model by the tare. ``samples`` random skins are drawn
-    under ``seed``.
+    ``electrode_position_sd`` is the standard deviation of electrode positions along the rim, in R.
+    ``electrode_width_log_sd`` and ``contact_log_sd`` are those of the logarithms of width and
+    contact impedance. ``out_of_round`` deforms the rim by two to four waves, together as strong as
+    one wave of this amplitude in R. ``background_log_sd`` is the standard deviation of the
+    logarithm of the conductivity, a smooth field with the correlation length ``background_length``
+    in R; ``drift_log_sd`` is the same for what changes after the tare.
+
+    Touches are discs of ``touch_radius`` in R and ``touch_contrast``. ``touch_shapes`` is the
+    weight of shaped touches, which are up to ``touch_aspect_max`` times as long as wide. If
+    ``row_gains`` is set, the tare scales each row to the model. ``samples`` random skins are drawn
+    with the seed ``seed``.
     """
 
     electrode_position_sd: float = 0.01
@@ -76,7 +79,8 @@ DEFAULT_UNCERTAINTY = Uncertainty()
 
 
 def uncertainty_from_table(value: object, where: str) -> Uncertainty | None:
-    """What a skin's file says at ``uncertainty``: a table, None for the defaults, or "none"."""
+    """Return the value of ``uncertainty`` in a skin's file: a table gives its values, None gives
+    the defaults, and "none" gives None."""
     if value is None:
         return DEFAULT_UNCERTAINTY
     if value == "none":
@@ -91,7 +95,7 @@ def uncertainty_from_table(value: object, where: str) -> Uncertainty | None:
 
 
 def uncertainty_to_table(uncertainty: Uncertainty | None) -> object:
-    """The value from which ``uncertainty_from_table`` makes an equal one."""
+    """Return the value from which ``uncertainty_from_table`` makes an equal one."""
     if uncertainty is None:
         return "none"
     return {

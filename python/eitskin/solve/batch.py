@@ -1,4 +1,4 @@
-"""Many frames that have nothing to do with each other, over threads: one context each, and C runs
+"""Reconstruct many independent frames in threads. Each thread has its own context, and C runs
 without Python's lock."""
 
 import os
@@ -31,27 +31,31 @@ T = TypeVar("T")
 
 
 def check_threads(threads: int | None) -> int:
-    """``threads``, or where it is None as many as this process may use."""
+    """Return ``threads``, or, if it is None, as many as this process may use.
+
+    Raises:
+        UsageError: the number is out of range.
+    """
     if threads is None:
         known = hasattr(os, "sched_getaffinity")
         count = len(os.sched_getaffinity(0)) if known else os.cpu_count() or 1
         return min(count, MAX_THREADS)
     if not 1 <= threads <= MAX_THREADS:
-        raise UsageError(f"{threads} threads cannot be; use 1 to {MAX_THREADS}")
+        raise UsageError(f"{threads} threads is out of range; use 1 to {MAX_THREADS}")
     return threads
 
 
 class Batch:
-    """Contexts of the C core, one a thread, with the same model, options and reference.
+    """Contexts of the C core, one per thread, with the same model, options and reference.
 
-    Each frame is reconstructed again, as :meth:`Reconstructor.forget` before each would do it: the
-    same bits, counts and, in the order of the frames, ids, however many threads there are.
-    ``engine`` is "c" or "c64"; ``threads`` None: all processors.
+    Each frame is reconstructed independently, as after :meth:`Reconstructor.forget`: bits, counts
+    and ids (in the order of the frames) are the same for any number of threads. ``engine`` is "c"
+    or "c64"; ``threads`` None uses all processors.
 
     Raises:
-        UsageError: an unknown engine, an option out of range, too many threads, or the core is not
-            built.
-        ModelError: the core refuses the model.
+        UsageError: the engine is unknown, an option or the number of threads is out of range, or
+            the core is not built.
+        ModelError: the core rejects the model.
     """
 
     def __init__(
@@ -72,7 +76,7 @@ class Batch:
         width = "float32" if engine == "c" else "float64"
         self._engines = [CoreEngine(content, width) for _ in range(self.threads)]
         self._on_each(lambda one: one.set_options(chosen))
-        # the last frame that could be used, if any
+        # the last usable frame, if any
         self._last = np.zeros((0, self._engines[0].n_rows))
 
     def _on_each(self, call: Callable[[CoreEngine], T]) -> T:
@@ -80,23 +84,23 @@ class Batch:
         return first
 
     def tare(self, quiet_v: npt.ArrayLike) -> LearnedReference:
-        """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the
-        noise."""
+        """Take the reference from untouched frames (k, m) or one (m,), in V; four or more also give
+        the noise."""
         frames = np.atleast_2d(np.asarray(quiet_v, dtype=np.float64))
         check_shape(frames, self._engines[0].n_rows, "reference", least=1)
         self._last = self._last[:0]
         return self._on_each(lambda one: one.set_reference(frames))
 
     def mask_rows(self, rows: BoolArray) -> None:
-        """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before
-        ``tare``."""
+        """Leave the rows of the protocol where ``rows`` (m,) is true out of every frame; call this
+        before ``tare``."""
         self._on_each(lambda one: one.mask_rows(rows))
 
     def each(
         self, frames_v: npt.ArrayLike, *, touches: bool = True
     ) -> Iterator[Reconstruction | FrameError]:
-        """The results of frames (k, m) in V, in their order; for a frame that cannot be used, its
-        error. Ids count up from 1."""
+        """Yield the results of frames (k, m) in V, in their order; for a frame that cannot be used,
+        yield its error. Ids count up from 1."""
         frames = np.asarray(frames_v, dtype=np.float64)
         check_shape(frames, self._engines[0].n_rows, "frames")
         size = max(1, min(MAX_IN_BLOCK, len(frames) // (4 * self.threads)))
@@ -105,7 +109,7 @@ class Batch:
             free.put(engine)
 
         def run(start: int) -> list[Reconstruction | FrameError]:
-            # a fresh one for the first frame of all
+            # the very first block uses the engine without earlier frames
             engine = free.get() if start > 0 else self._engines[0]
             try:
                 engine.follow(np.vstack([self._last, frames[max(0, start - MAX_IN_BLOCK) : start]]))
@@ -137,8 +141,8 @@ def reconstruct_many(
     options: Options | None = None,
     touches: bool = True,
 ) -> list[Reconstruction]:
-    """Images and touches of frames (k, m) in V after taring on ``quiet_v`` (q, m) or (m,); see
-    :class:`Batch`.
+    """Return images and touches of frames (k, m) in V after a tare on ``quiet_v`` (q, m) or (m,);
+    see :class:`Batch`.
 
     Raises:
         FrameError: a frame cannot be used; the text has its number.

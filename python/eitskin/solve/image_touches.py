@@ -1,7 +1,7 @@
-"""Touches out of an image, by one plain rule that is the same for every method.
+"""Find touches in an image by one simple rule that is the same for every method.
 
 Pixels with x > t max(x) are grouped into connected components (pixels that share an edge or a
-corner); each component is one touch, at the centroid of its pixels weighted by their values.
+corner). Each component is a touch at the centroid of its pixels, weighted by their values.
 """
 
 import numpy as np
@@ -18,9 +18,15 @@ def touches_in_image(
     threshold: float,
     sign: int = 1,
 ) -> FloatArray:
-    """Positions (k, 2) in mm of the touches that an image (n,) shows, the strongest (summed value)
-    first. ``index`` (n, 2): each pixel's column and row; ``threshold``: the fraction t; ``sign``:
-    -1 for resistive touches."""
+    """Return the positions (k, 2) in mm of the touches in an image (n,), the strongest (summed
+    value) first.
+
+    ``index`` (n, 2) holds the column and row of each pixel, ``centres_mm`` (n, 2) its centre.
+    ``threshold`` is the fraction t, and ``sign`` is -1 for touches that decrease the conductivity.
+
+    Raises:
+        MissingExtraError: scipy is not installed.
+    """
     try:
         from scipy.ndimage import label
     except ImportError:

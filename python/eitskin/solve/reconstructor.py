@@ -1,4 +1,4 @@
-"""Frames to images and touches with one signature, whichever engine does it: the C core or the
+"""Reconstruct images and touches from frames with one interface for all engines: the C core or the
 numpy reference."""
 
 from collections.abc import Iterable, Iterator
@@ -34,12 +34,18 @@ MIN_CORRELATION = 0.9
 
 
 class Reconstructor:
-    """One skin's reconstruction: tare on quiet frames, then turn frames into images and touches.
+    """The reconstruction of one skin: tare on untouched frames, then reconstruct images and touches
+    from frames.
 
     ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or
-    "numpy" (the reference, of a checkout). What is wrong with a frame is found, left out
-    where that helps, and named in ``info.found`` (docs/reference/diagnostics.md); the option
-    ``diagnostics`` chooses what is looked for.
+    "numpy" (the reference, in a checkout only). Problems of a frame are detected, affected rows are
+    left out if that helps, and ``info.found`` names them (docs/reference/diagnostics.md); the
+    option ``diagnostics`` chooses what is checked.
+
+    Raises:
+        ModelError: the C core rejects the model.
+        UsageError: the engine is unknown, an option is out of range, or the core is not built.
+        MissingExtraError: the numpy reference is not installed.
 
     Raises:
         ModelError: the C core refuses the model.
@@ -70,26 +76,26 @@ class Reconstructor:
 
     @classmethod
     def from_file(cls, path: str | Path, *, engine: str = "c") -> "Reconstructor":
-        """With the model in the file ``path``; raises what ``load_model`` raises besides."""
+        """Return a reconstructor with the model in the file ``path``; also raises the errors of
+        ``load_model``."""
         model, blob = load_model(path)
         return cls(model, engine=engine, blob=blob)
 
     @property
     def c_engine(self) -> CoreEngine | None:
-        """The C core's context, for what else works on it; None of another engine."""
+        """The context of the C core, for other code that works on it; None for other engines."""
         return self._engine if isinstance(self._engine, CoreEngine) else None
 
     @property
     def options(self) -> Options:
-        """The options in force."""
+        """The current options."""
         return self._options
 
     def set_options(self, options: Options | None = None, /, **changes: Any) -> None:
-        """Solve with ``options`` (None: those in use) and with ``changes`` to them by name, from
-        now on.
+        """Use ``options`` (None: the current ones) with ``changes`` to them by name from now on.
 
         Raises:
-            UsageError: one is unknown or out of its range; the old ones stay.
+            UsageError: an option is unknown or out of range; the old options stay.
         """
         known = [entry.name for entry in fields(Options)]
         for name in changes:
@@ -101,7 +107,7 @@ class Reconstructor:
         self._options = wanted
 
     def check_protocol(self, protocol: Protocol) -> None:
-        """Refuse frames that were scanned with another protocol than the model's.
+        """Check that ``protocol`` is the model's.
 
         Raises:
             ProtocolError: the tables differ.
@@ -116,8 +122,8 @@ class Reconstructor:
             )
 
     def tare(self, quiet_v: npt.ArrayLike) -> LearnedReference:
-        """Take the reference from quiet frames (k, m) or one (m,), in V; four or more also give the
-        noise, and single readings that the others do not bear out are left out (``outliers``).
+        """Take the reference from untouched frames (k, m) or one (m,), in V. Four or more also give
+        the noise, and single readings that contradict the others are left out (``outliers``).
 
         Raises:
             FrameError: a frame has the wrong length or cannot be used.
@@ -127,11 +133,11 @@ class Reconstructor:
         return self._engine.set_reference(frames)
 
     def mask_rows(self, rows: BoolArray) -> None:
-        """Leave the protocol rows where ``rows`` (m,) is true out of every frame; call before
-        ``tare``.
+        """Leave the rows of the protocol where ``rows`` (m,) is true out of every frame; call this
+        before ``tare``.
 
         Raises:
-            UsageError: not one truth value a row.
+            UsageError: ``rows`` is not one truth value per row.
         """
         given, count = np.asarray(rows), self.model.protocol.n_rows
         if given.shape != (count,) or given.dtype != np.bool_:
@@ -142,7 +148,7 @@ class Reconstructor:
         self._engine.mask_rows(given)
 
     def reconstruct(self, frame_v: npt.ArrayLike, *, touches: bool = True) -> Reconstruction:
-        """One frame (m,) in V.
+        """Reconstruct one frame (m,) in V.
 
         Raises:
             FrameError: the frame cannot be used, or no reference has been taken.
@@ -151,18 +157,18 @@ class Reconstructor:
         return replace(result, model=self.model)
 
     def stream(self, frames_v: Iterable[npt.ArrayLike]) -> Iterator[Reconstruction]:
-        """One after another; ids follow touches from frame to frame."""
+        """Reconstruct frames one after another; a touch keeps its id from frame to frame."""
         for frame in frames_v:
             yield self.reconstruct(frame)
 
     def forget(self) -> None:
-        """Forget the warm start and the touches that were followed: the next frame has nothing to
-        do with the last."""
+        """Forget the coefficients for the warm start and the tracked touches, so that the next
+        frame does not depend on earlier ones."""
         self._engine.forget()
 
 
 def _reference_engine(model: Model) -> "ReferenceEngine":
-    """Of a package that the wheel does not have."""
+    """Return the numpy reference, which is in a package that the wheel does not contain."""
     try:
         from eitskin_reference.engine import ReferenceEngine
     except ImportError:

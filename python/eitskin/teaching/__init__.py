@@ -1,1 +1,2 @@
-"""A model learned from presses at known places: their file, the fit, its report."""
+"""Teaching: learn a model from presses at known places; the file of presses, the fit, and its
+report."""

@@ -1,4 +1,5 @@
-"""Presses that cannot teach are refused before any work; a line says which, and what to do."""
+"""Checks that reject presses from which nothing can be learned, before any work; the error states
+which ones and what to do."""
 
 import numpy as np
 
@@ -8,17 +9,21 @@ from eitskin.skin.skin import Skin
 from eitskin.teaching.presses import Presses
 
 MIN_PRESSES = 5
-FAINT = 0.1  # of the median change: no press
+FAINT = 0.1  # relative to the median change; a smaller change does not count as a press
 UNITS = {"cm": 10.0, "m": 1000.0, "inches": 25.4, "µm": 0.001}
 LEAST_COVER, FAIR_COVER = 0.02, 0.4
 
 
 def check_presses(presses: Presses, skin: Skin | None) -> list[str]:
-    """Refuse what cannot teach; the rest as notes."""
+    """Check that ``presses`` can teach; return notes about smaller problems.
+
+    Raises:
+        FrameError: there are too few presses, some are too faint, or their places are wrong.
+    """
     if len(presses) < MIN_PRESSES:
         raise FrameError(
             f"teach: {len(presses)} presses are too few; record at least {MIN_PRESSES}, better 20"
-            " (eitskin teach plan says where)"
+            " (eitskin teach plan chooses the places)"
         )
     notes: list[str] = []
     size = np.linalg.norm(presses.difference, axis=1)
@@ -56,18 +61,18 @@ def check_presses(presses: Presses, skin: Skin | None) -> list[str]:
     if cover < LEAST_COVER:
         raise FrameError(
             f"teach: the presses cover {100 * cover:.1f} % of the skin; press all over it"
-            " (eitskin teach plan says where)"
+            " (eitskin teach plan chooses the places)"
         )
     if cover < FAIR_COVER:
         notes.append(
-            f"the presses cover {100 * cover:.0f} % of the skin; elsewhere the model is the"
-            " physics' guess: press there too"
+            f"the presses cover {100 * cover:.0f} % of the skin; elsewhere the model is only an"
+            " extrapolation by physics: press there too"
         )
     return notes
 
 
 def hull_area(place_mm: FloatArray) -> float:
-    """The area of the convex hull of places, mm²; 0 for places on a line."""
+    """Return the area of the convex hull of places in mm², 0 for places on a line."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:

@@ -1,5 +1,5 @@
-"""What presses teach by the likelihood, whether their places are mirrored or shifted by some
-presses, and whether they explain the voltages at all."""
+"""Learn from presses by likelihood, and find out whether their places are mirrored or shifted by
+some presses, and whether they explain the voltages at all."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -28,16 +28,16 @@ from eitskin.teaching.left_out import LeftOut, chance_share, leave_one_out, refi
 from eitskin.teaching.presses import Presses, shifted
 
 PIXELS_ACROSS = 32
-MIRROR_GAIN = 10.0  # of log likelihood
-UNEXPLAINED = 0.8  # mean of chance_share and noise; presses of a real skin, 12 or more, have < .6
-POOR = 0.3  # chance_share above which a report says so
-EXPLAINED = 0.5  # chance_share below which shifted places are the right ones
+MIRROR_GAIN = 10.0  # gain of log likelihood from which places count as mirrored
+UNEXPLAINED = 0.8  # mean of chance_share and noise; 12 or more presses of a real skin have < .6
+POOR = 0.3  # chance_share above which a note is added to the report
+EXPLAINED = 0.5  # chance_share below which shifted places are accepted
 MAX_SHIFT, ENOUGH_FOR_SHIFT = 3, 60  # presses
 
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """``presses`` and what they taught, on ``grid`` of the skin ``seen_as``."""
+    """``presses`` and what was learned from them, on the ``grid`` of the skin ``seen_as``."""
 
     presses: Presses
     learned: Learned
@@ -49,17 +49,18 @@ class Explained:
 
     @property
     def chance(self) -> float:
-        """Of the error by chance, how much the presses left out have."""
+        """The error of presses left out, as a fraction of the error by chance."""
         return chance_share(self.left_out.place_mm, self.learned.process.place_mm)
 
     @property
     def noise(self) -> float:
-        """Of a press."""
+        """The noise as a fraction of a press."""
         return float(np.sqrt(np.mean(self.learned.process.left_out() ** 2)))
 
     @property
     def is_chance(self) -> bool:
-        """Whether they explain each other no better than presses anywhere."""
+        """Return whether the presses predict each other no better than presses at random places
+        would."""
         return (self.chance + min(self.noise, 1)) / 2 > UNEXPLAINED
 
 
@@ -70,19 +71,19 @@ def quiet_progress(items: Iterable[Any], what: str) -> Iterable[Any]:
 def explained(
     presses: Presses, skin: Skin | None, place_sd_mm: float, progress: Progress
 ) -> Explained:
-    """What ``presses`` teach by the likelihood, and how well they explain each other."""
+    """Learn from ``presses`` by likelihood, and find out how well they predict each other."""
     notes, given = [], known_size(presses)
     kernel, width_mm = starting_kernel(presses, skin)
     if skin is None:
         notes.append(
-            "no description of the skin: places that were not pressed are guessed from near ones"
-            " alone, and errors are about twice as large; give --skin"
+            "no description of the skin: places that were not pressed are estimated only from"
+            " nearby ones, and errors are about twice as large; give --skin"
         )
     else:
         kernel, mirrored = mirrored_or_not(kernel, presses, given, width_mm)
         if mirrored:
             notes.append(
-                "the places are mirrored against the description; the model follows the places"
+                "the places are mirrored relative to the description; the model uses the places"
             )
     learned = learn(
         kernel, presses.place_mm, presses.difference, given, width_mm,
@@ -98,8 +99,9 @@ def explained(
     found = Explained(presses, learned, left_out, grid, seen_as, width_mm, notes)
     if found.chance > POOR:
         notes.append(
-            f"the places explain the voltages badly, left out {100 * found.chance:.0f} % of the"
-            " error of chance: press more, one finger at a time, the skin untouched before each"
+            f"the places explain the voltages badly (error of presses left out is"
+            f" {100 * found.chance:.0f} % of chance): press more places, with one finger, and leave"
+            " the skin untouched before each press"
         )
     return found
 
@@ -107,8 +109,12 @@ def explained(
 def shifted_or_refused(
     found: Explained, skin: Skin | None, place_sd_mm: float, progress: Progress
 ) -> Explained:
-    """``found`` explains nothing: the same with each press at a place some later or earlier, where
-    that does."""
+    """Handle ``found``, which explains nothing: shift the places by some presses, and return the
+    result of the first shift that explains them.
+
+    Raises:
+        FrameError: no shift explains the voltages.
+    """
     presses = found.presses
     few = presses.take(np.arange(min(len(presses), ENOUGH_FOR_SHIFT)))
     for by in shifts(presses):
@@ -119,40 +125,41 @@ def shifted_or_refused(
             other.notes.append(shift_note(by))
             return other
     raise FrameError(
-        "teach: the places do not explain the voltages, not mirrored or shifted by"
-        f" {MAX_SHIFT} presses either: presses left out are"
-        f" {np.median(found.left_out.error_mm):.0f} mm off, {100 * found.chance:.0f} % of chance,"
-        f" noise is {100 * found.noise:.0f} % of a press;"
-        " record them again, each where the plan says, and look at the electrodes with  eitskin"
-        " doctor"
+        "teach: the places do not explain the voltages, even if mirrored or shifted by up to"
+        f" {MAX_SHIFT} presses: the error of presses left out is"
+        f" {np.median(found.left_out.error_mm):.0f} mm, {100 * found.chance:.0f} % of chance, and"
+        f" noise is {100 * found.noise:.0f} % of a press; record them again, each at its place in"
+        " the plan, and check the electrodes with  eitskin doctor"
     )
 
 
 def shifts(presses: Presses) -> list[int]:
-    """By how many places presses may be off, likely ones first."""
+    """Return the numbers of places by which presses may be shifted, likely ones first."""
     few = min(MAX_SHIFT, len(presses) - MIN_PRESSES)
     return [sign * by for by in range(1, few + 1) for sign in (1, -1)]
 
 
 def shift_note(by: int) -> str:
+    """Return a note that describes the shift."""
     count = abs(by)
     how = f"the first {count} were missed" if by > 0 else f"{count} more came first"
     if count == 1:
         how = "the first was missed" if by > 0 else "one more came first"
     return (
         f"the places are shifted by {'one press' if count == 1 else f'{count} presses'}, as if"
-        f" {how}; the model is of each press at a place {'later' if by > 0 else 'earlier'} in the"
-        " list, without the odd ones"
+        f" {how}; the model uses each press with a {'later' if by > 0 else 'earlier'} place in the"
+        " list, and leaves out the ones without a place"
     )
 
 
 def known_size(presses: Presses) -> FloatArray | None:
-    """What is known of how hard each press was: force, else depth; None for nothing."""
+    """Return what is known about the size of each press: the force, otherwise the depth, or
+    None."""
     return presses.force_n if presses.force_n is not None else presses.depth_mm
 
 
 def starting_kernel(presses: Presses, skin: Skin | None) -> tuple[Kernel, float]:
-    """The kernel before any fit, and the skin's width in mm."""
+    """Return the kernel before any fit, and the width of the skin in mm."""
     if skin is None:
         kernel = default_kernel(None, presses.place_mm)
         return kernel, 4 * kernel.length_mm
@@ -165,7 +172,8 @@ def starting_kernel(presses: Presses, skin: Skin | None) -> tuple[Kernel, float]
 
 
 def seen_skin(learned: Learned, skin: Skin | None, presses: Presses) -> Skin:
-    """The skin in the presses' coordinates; without a description a disk around them."""
+    """Return the skin in the coordinates of the presses; without a description, a disk around
+    them."""
     if skin is not None:
         return learned.kernel.placement.skin_in_places(skin)
 
@@ -177,7 +185,7 @@ def seen_skin(learned: Learned, skin: Skin | None, presses: Presses) -> Skin:
 def mirrored_or_not(
     kernel: Kernel, presses: Presses, given: FloatArray | None, width_mm: float
 ) -> tuple[Kernel, bool]:
-    """``kernel``, mirrored where that is far more likely."""
+    """Return ``kernel``, mirrored if that is far more likely, and whether it is."""
     few = np.linspace(0, len(presses) - 1, min(len(presses), 60)).astype(int)
     data, _ = differences(presses.difference[few])
     place = presses.place_mm[few]

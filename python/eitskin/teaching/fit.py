@@ -1,4 +1,4 @@
-"""From presses to what a skin answers to a press anywhere: geometry and hyperparameters by marginal
+"""Learn how a skin responds to a press anywhere: geometry and hyperparameters by marginal
 likelihood, amplitudes and noise from presses left out."""
 
 from dataclasses import dataclass, replace
@@ -16,19 +16,21 @@ from eitskin.teaching.process import Process, condition
 START_ANGLES = 32
 MAX_FOR_LIKELIHOOD = 150
 KNOWN_ROUNDS, UNKNOWN_ROUNDS = 3, 8
-NEAR = 0.18  # of the skin's width: presses that near are compared to begin with
-SCALE_SD = 0.05  # of log scale: a skin is about as large as it is described
+NEAR = 0.18  # relative to the skin's width: first amplitudes compare presses within this distance
+SCALE_SD = 0.05  # standard deviation of the log scale: descriptions give about the right size
 LOG_BOUND = 12.0
-LEAST_SHRINKAGE = 0.5  # residuals are not normal: the formula alone trusts too much
-UNKNOWN = 1.5  # times what independent residuals leave unknown of a row's variance; theirs are not
-DRIFT = 0.3  # of the drift's covariance: one of few, long in its tails
+LEAST_SHRINKAGE = 0.5  # the formula shrinks too little, because residuals are not normal
+# A row's variance is less certain than from independent residuals, by this factor: they are
+# dependent.
+UNKNOWN = 1.5
+DRIFT = 0.3  # weight of the drift's covariance, which rests on few presses with long tails
 PLACE_ROUNDS, PLACE_KEPT = 5, 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """The covariance of a row's noise: ``whitening`` W (m, m), W C W' = I, for rows over their
-    units; ``shrinkage`` of the correlations, 1 for none trusted."""
+    """The covariance of the noise of rows over their units: ``whitening`` W (m, m) with W C W' = I,
+    ``covariance`` C, and the ``shrinkage`` of the correlations (1: they are all ignored)."""
 
     whitening: FloatArray
     covariance: FloatArray
@@ -36,8 +38,12 @@ class Noise:
 
 
 def differences(difference: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Each row over its rms, (n, m), and that rms (m,); rows that carry nothing get the greatest
-    rms, which keeps them at zero."""
+    """Return each row over its rms, (n, m), and the rms (m,). Rows without signal get the greatest
+    rms, which keeps them at zero.
+
+    Raises:
+        FrameError: no row has a signal.
+    """
     rms = np.sqrt(np.mean(difference**2, axis=0))
     if not rms.max() > 0:
         raise FrameError(
@@ -56,7 +62,8 @@ def chosen_kernel(
     angles: int = START_ANGLES,
     progress: Progress = silent,
 ) -> tuple[Kernel, float]:
-    """``kernel`` with placement, own-row term and noise of the greatest likelihood, and its log."""
+    """Return ``kernel`` with the placement, own-row term and noise of the greatest likelihood, and
+    the logarithm of that likelihood."""
     try:
         from scipy.optimize import minimize
     except ImportError:
@@ -107,8 +114,8 @@ def chosen_kernel(
 def first_amplitudes(
     place_mm: FloatArray, data: FloatArray, given: FloatArray | None, near_mm: float
 ) -> FloatArray:
-    """Where a fit begins, mean 1: in proportion to ``given`` depths or forces; else |y| over its
-    mean nearby."""
+    """Return the amplitudes (n,) from which a fit starts, with mean 1: in proportion to ``given``
+    depths or forces, otherwise |y| over its mean nearby."""
     size = np.linalg.norm(data, axis=1)
     away = np.linalg.norm(place_mm[:, None] - place_mm[None], axis=-1)
     near = (away < near_mm) * 1.0
@@ -121,8 +128,8 @@ def first_amplitudes(
 
 
 def noise_of(residual: FloatArray, unit: FloatArray) -> Noise:
-    """The covariance of residuals (n, m) of rows over their ``unit`` (m,): correlations shrunk
-    after Schaefer and Strimmer (Stat. Appl. Genet. Mol. Biol. 4, 2005, article 32)."""
+    """Return the covariance of residuals (n, m) of rows over their ``unit`` (m,). Correlations are
+    shrunk as in Schaefer and Strimmer (Stat. Appl. Genet. Mol. Biol. 4, 2005, article 32)."""
     count, rows = residual.shape
     squares = residual**2
     x = residual / np.sqrt(np.maximum(squares.mean(axis=0), 1e-300))
@@ -140,9 +147,9 @@ def noise_of(residual: FloatArray, unit: FloatArray) -> Noise:
 
 
 def _variances(squares: FloatArray, unit: FloatArray) -> FloatArray:
-    """The variance (m,) of each row from squared residuals (n, m): its logarithm is drawn towards
-    what rows of the same ``unit`` have, as far as n residuals leave it unknown; weak rows have
-    more noise in their unit."""
+    """Return the variance (m,) of each row from squared residuals (n, m). Its logarithm is shrunk
+    towards that of rows with the same ``unit``, as far as n residuals leave it uncertain; weak rows
+    have more noise relative to their unit."""
     variance, count = squares.mean(axis=0), len(squares)
     median = float(np.median(variance[variance > 0])) if (variance > 0).any() else 1.0
     known = variance > 1e-6 * median
@@ -160,35 +167,36 @@ def _variances(squares: FloatArray, unit: FloatArray) -> FloatArray:
 
 
 def whitening_of(covariance: FloatArray) -> FloatArray:
-    """W (m, m) with W C W' = I for the covariance C."""
+    """Return W (m, m) with W C W' = I for the covariance C."""
     sd = np.sqrt(np.diag(covariance))
     lower = np.linalg.cholesky(covariance / sd / sd[:, None])
     return np.asarray(np.linalg.inv(lower) / sd)
 
 
 def suiting_amplitudes(answer: FloatArray, data: FloatArray, whitening: FloatArray) -> FloatArray:
-    """The amplitude (n,) at which each of ``answer`` (n, m) suits ``data`` (n, m) best."""
+    """Return the amplitude (n,) at which each of ``answer`` (n, m) fits ``data`` (n, m) best."""
     expected, seen = answer @ whitening.T, data @ whitening.T
     energy = np.maximum((expected**2).sum(axis=1), 1e-300)
     return np.asarray(np.clip((seen * expected).sum(axis=1) / energy, 0.05, 20))
 
 
 def left_out_amplitudes(process: Process, noise: Noise, given: FloatArray | None) -> FloatArray:
-    """What each press's amplitude is by the others; presses of one given depth get their median,
-    depths that hardly repeat a power law."""
+    """Return the amplitude of each press as predicted by the others. Presses with the same given
+    depth get their median; depths that hardly repeat get a power law."""
     answer = (process.data - process.left_out()) / process.amplitude[:, None]
     amplitude = suiting_amplitudes(answer, process.data, noise.whitening)
     return amplitude if given is None else by_given(amplitude, given)
 
 
 def refitted_amplitudes(process: Process, noise: Noise, given: FloatArray | None) -> FloatArray:
-    """``left_out_amplitudes``, mean 1."""
+    """Return ``left_out_amplitudes`` scaled to mean 1."""
     amplitude = left_out_amplitudes(process, noise, given)
     return np.asarray(amplitude / amplitude.mean())
 
 
 def by_given(amplitude: FloatArray, given: FloatArray) -> FloatArray:
-    """Amplitudes (n,) by the given depth or force alone, where that is known."""
+    """Return amplitudes (n,) that follow only from the given depth or force, where that is
+    known."""
     known = np.isfinite(given) & (given > 0)
     levels, which, counts = np.unique(given[known], return_inverse=True, return_counts=True)
     if not len(levels):
@@ -205,8 +213,8 @@ def by_given(amplitude: FloatArray, given: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What presses teach: ``process`` and ``noise`` for rows over ``unit`` (m,) V; ``likelihood``;
-    ``kernel``; places as refined."""
+    """The result of learning from presses: ``process`` and ``noise`` for rows over ``unit`` (m,) in
+    V, and the likelihood. The process holds the kernel, and the places as refined."""
 
     process: Process
     noise: Noise
@@ -218,13 +226,13 @@ class Learned:
         return self.process.kernel
 
     def whitened(self, difference: FloatArray) -> FloatArray:
-        """Differences (n, m) V in the noise's own metric."""
+        """Return differences (n, m) in V in the metric of the noise."""
         return np.asarray((difference / self.unit) @ self.noise.whitening.T)
 
 
 def with_drift(learned: Learned, untouched: FloatArray, age: int) -> Learned:
-    """``learned``, whose noise has the drift between ``untouched`` frames (n, m) V in order of time
-    that are ``age`` presses apart as well; 0 for none."""
+    """Return ``learned`` with noise that includes the drift between ``untouched`` frames (n, m) in
+    V, in order of time, that are ``age`` presses apart; 0 adds none."""
     if age == 0:
         return learned
     drift = (untouched[age:] - untouched[:-age]) / learned.unit
@@ -246,7 +254,8 @@ def learn(
     amplitude: FloatArray | None = None,
     progress: Progress = silent,
 ) -> Learned:
-    """Learn from presses; ``choose`` False keeps the kernel's numbers, as for presses held out."""
+    """Learn from presses; with ``choose`` False the numbers of the kernel stay, as for held-out
+    presses."""
     data, unit = differences(difference)
     if amplitude is None:
         amplitude = first_amplitudes(place_mm, data, given, NEAR * width_mm)
@@ -271,7 +280,8 @@ def learn(
 def default_kernel(
     skin_kernel: tuple[Any, tuple[float, float]] | None, place_mm: FloatArray
 ) -> Kernel:
-    """The kernel before the likelihood: of a skin's sensitivity and centre, or stationary."""
+    """Return the kernel before the likelihood is maximised: from a skin's sensitivity and centre,
+    or stationary."""
     if skin_kernel is not None:
         return Kernel(skin_kernel[0], skin_kernel[1])
     middle = place_mm.mean(axis=0)

@@ -1,14 +1,14 @@
-"""A person presses where the plan says: which place is next, when to press, when to lift, and
-whether a press is good. It sees frames and nothing else, so that the command line, the page and a
-program guide alike.
+"""Guide a person through the presses of a plan: which place is next, when to press, when to lift,
+and whether a press is good. The guide sees nothing but frames, so the command line, the page and
+programs can all use it.
 
-A press is seen by its distance from the skin at rest, in units of the noise at rest: the rms over
-rows of change over the row's noise. It counts when it was held: two halves of the hold differ by
-little, neither in strength (it went on sinking, or was let go) nor in direction over the rows (it
-moved or slipped). The untouched frame is the mean of the frames just before. A skin at rest is
-as it was when it was untouched last, at first as in the first frame; where it is not, somebody
-presses too early, and the guide waits: else lifting would count as the press, and each place as the
-next one's.
+A press is detected by its distance from the skin at rest, in units of the noise at rest: the rms
+over rows of the change over the row's noise. It counts if it was held, which means that two halves
+of the hold differ little, both in strength (otherwise it kept sinking, or was released) and in
+direction over the rows (otherwise it moved or slipped). The untouched frame is the mean of the
+frames just before. The skin is at rest if it is as when it was last untouched, at first as in the
+first frame. If it is not, somebody presses too early, and the guide waits. Otherwise lifting would
+count as the press, and each place would get the next one's press.
 """
 
 from collections import deque
@@ -26,21 +26,21 @@ from eitskin.errors import UsageError
 from eitskin.teaching.plan import PressPlan
 from eitskin.teaching.press_file import PressFile
 
-PACE_US = 25_000  # a frame: a hold of twelve is .3 s
-JUMPS = 2  # between frames at rest: so many of the greatest are not counted as noise
-REST_FRAMES = 12  # of which the untouched frame is the mean
-SETTLE_FRAMES = 8  # after contact, before the hold counts
-HOLD_FRAMES = 12  # of which the pressed frame is the mean
-PATIENCE_FRAMES = 200  # that a skin which never rests, or rests elsewhere, is waited for
-PRESS_ABOVE = 8.0  # a change of so many times the noise is a press
-LIFTED_BELOW = 0.2  # one of so small a part of the press is none any more
-HELD_ABOVE = 0.7  # one of so great a part, for all that patience, was not lifted
-STRENGTH_CHANGE = 0.1  # between the halves of a hold, at most
-TURN = 0.02  # 1 - cosine between the changes of the two halves, at most, beside what noise makes
+PACE_US = 25_000  # per frame: a hold of twelve frames takes .3 s
+JUMPS = 2  # greatest differences between frames at rest that do not count as noise
+REST_FRAMES = 12  # the untouched frame is their mean
+SETTLE_FRAMES = 8  # frames after contact before the hold begins
+HOLD_FRAMES = 12  # the pressed frame is their mean
+PATIENCE_FRAMES = 200  # how long to wait for a skin that does not return to rest
+PRESS_ABOVE = 8.0  # in units of the noise; a greater change is a press
+LIFTED_BELOW = 0.2  # fraction of the press; below it the finger was lifted
+HELD_ABOVE = 0.7  # fraction of the press; above it after PATIENCE_FRAMES, nothing was lifted
+STRENGTH_CHANGE = 0.1  # greatest change between the halves of a hold
+TURN = 0.02  # greatest 1 - cosine between the changes of both halves, in addition to noise
 
 
 class Step(Enum):
-    """What the person is asked to do."""
+    """The steps that the person is asked to do."""
 
     REST = "leave the skin untouched"
     PRESS = "press"
@@ -51,9 +51,9 @@ class Step(Enum):
 
 @dataclass(frozen=True, eq=False)
 class GuideEvent:
-    """What changed with a frame: ``step`` is what to do now, at place ``number`` (from 0); ``text``
-    says it to the person; ``accepted`` and ``rejected`` what became of a press, ``withdrawn`` of
-    one that was accepted."""
+    """A change in the guidance after a frame: ``step`` is the step to do now, at place ``number``
+    (from 0), and ``text`` tells it to the person. ``accepted`` and ``rejected`` state the result of
+    a press; ``withdrawn`` states that an accepted press no longer counts."""
 
     step: Step
     number: int
@@ -64,8 +64,8 @@ class GuideEvent:
 
 
 class PressGuide:
-    """Guides through ``plan`` from place ``start`` on. ``feed`` it every frame; ``taken`` is the
-    last good press: untouched and pressed frame (m,), time in s.
+    """Guides through ``plan`` from place ``start`` on. Pass every frame to ``feed``; ``taken`` is
+    the last good press: untouched and pressed frame (m,), and time in s.
 
     Raises:
         UsageError: the plan has no place ``start``.
@@ -87,7 +87,7 @@ class PressGuide:
 
     @property
     def place_mm(self) -> tuple[float, float]:
-        """Where to press now; the last place at the end."""
+        """The place to press now; at the end, the last place."""
         x, y = self.plan.place_mm[min(self.number, len(self.plan) - 1)]
         return float(x), float(y)
 
@@ -97,12 +97,12 @@ class PressGuide:
         return self._rests(f"place {number + 1} again")
 
     def skip(self) -> GuideEvent:
-        """Leave this place out."""
+        """Leave out this place."""
         return self._next("left out")
 
     def feed(self, voltage_v: npt.ArrayLike, time_s: float) -> GuideEvent | None:
-        """Take a frame (m,) at ``time_s``; None where nothing changed. Frames with rows that were
-        not measured are passed over."""
+        """Process a frame (m,) at ``time_s``; return None if nothing changed. Frames with rows that
+        were not measured are ignored."""
         frame = np.asarray(voltage_v, dtype=np.float64)
         if self.step is Step.DONE or not np.isfinite(frame).all():
             return None
@@ -114,9 +114,9 @@ class PressGuide:
         }[self.step](frame, time_s)
 
     def _at_rest(self, frame: FloatArray, _: float) -> GuideEvent | None:
-        """Wait until the skin rests: two halves of the last frames agree to within the noise, and
-        with the skin as it was untouched last. One that creeps for ever, or stays elsewhere, is
-        taken as it is after ``PATIENCE_FRAMES``."""
+        """Wait until the skin rests: two halves of the last frames agree within the noise, and with
+        the skin when it was last untouched. A skin that keeps creeping, or rests in another state,
+        is accepted after ``PATIENCE_FRAMES``."""
         self._rest.append(frame)
         if self._untouched is None:
             self._untouched = frame
@@ -125,7 +125,9 @@ class PressGuide:
             return None
         frames = np.array(self._rest)
         steps = np.diff(frames, axis=0)
-        quiet = np.argsort(np.linalg.norm(steps, axis=1))[:-JUMPS]  # a finger's jump is no noise
+        quiet = np.argsort(np.linalg.norm(steps, axis=1))[
+            :-JUMPS
+        ]  # the jump of a finger is not noise
         spread = steps[quiet].std(axis=0) / np.sqrt(2)
         noise = np.maximum(spread, 0.2 * np.median(spread) + np.finfo(float).tiny)
         noise = noise if self._noise is None else 0.8 * self._noise + 0.2 * noise
@@ -140,7 +142,7 @@ class PressGuide:
         return self._asks(Step.PRESS, "press")
 
     def _warns(self) -> GuideEvent | None:
-        """Once, that the skin rests elsewhere; the patience begins again."""
+        """Warn once that the skin rests in another state; the waiting time starts again."""
         if self._warned:
             return None
         self._warned = True
@@ -163,7 +165,7 @@ class PressGuide:
         if len(self._hold) < SETTLE_FRAMES + HOLD_FRAMES:
             if self._size(frame) > PRESS_ABOVE / 2:
                 return None
-            return self._refuses("it was let go too early; hold it until you are told to lift")
+            return self._refuses("it was released too early; hold until the guide asks you to lift")
         frames = np.array(self._hold[SETTLE_FRAMES:])
         wrong = self._judged(frames)
         pressed = frames.mean(axis=0)
@@ -176,7 +178,7 @@ class PressGuide:
         return GuideEvent(Step.LIFT, self.number, "good; lift", accepted=True)
 
     def _judged(self, frames: FloatArray) -> str:
-        """What is wrong with a hold, or nothing."""
+        """Return what is wrong with a hold, or ""."""
         assert self._noise is not None
         assert self._untouched is not None
         half = len(frames) // 2
@@ -186,7 +188,7 @@ class PressGuide:
         )
         sizes = np.linalg.norm(first), np.linalg.norm(second)
         change = sizes[1] / sizes[0] - 1
-        noisy = len(first) * 2 / half / sizes[0] ** 2  # what the noise of both halves makes of it
+        noisy = len(first) * 2 / half / sizes[0] ** 2  # the effect of the noise of both halves
         if 1 - first @ second / (sizes[0] * sizes[1]) > TURN + noisy:
             return "it moved or slipped"
         if abs(change) > STRENGTH_CHANGE + 2 * np.sqrt(noisy / len(first)):
@@ -201,12 +203,12 @@ class PressGuide:
         held = self._size(frame) > HELD_ABOVE * self._strength
         if self._came_back or not held or self._waited < PATIENCE_FRAMES:
             return None
-        why = "the skin is not as it was before this press; perhaps lifting was taken for it"
+        why = "the skin is not as it was before this press; perhaps lifting was taken for a press"
         withdrawn, event = self._good, self._rests(f"again, please: {why}")
         return replace(event, rejected=why, withdrawn=withdrawn)
 
     def _lifted(self) -> float:
-        """A change of the skin, over the noise, below which nothing touches it."""
+        """Return the change over the noise below which the skin counts as untouched."""
         return max(PRESS_ABOVE, LIFTED_BELOW * self._strength)
 
     def _refuses(self, why: str) -> GuideEvent:
@@ -234,7 +236,7 @@ class PressGuide:
         return GuideEvent(step, self.number, text)
 
     def _size(self, frame: FloatArray) -> float:
-        """The change over the noise."""
+        """Return the change over the noise."""
         assert self._noise is not None
         assert self._untouched is not None
         return _rms((frame - self._untouched) / self._noise)
@@ -245,8 +247,8 @@ def _rms(values: FloatArray) -> float:
 
 
 def scan_of_presses(board: BoardInfo, replays: bool) -> ScanSettings:
-    """Every row of every frame, no faster than a person presses; a board that is given its frames,
-    or a recording, sends what it has."""
+    """Return the scan for presses: every row of every frame, no faster than a person presses. A
+    board that is given its frames, or a recording, sends what it has."""
     if board.frames_given or replays:
         return ScanSettings()
     slow = board.n_rows * board.slot_us >= PACE_US
@@ -262,8 +264,8 @@ def guide_presses(
 ) -> None:
     """Guide until all places are done or ``frames`` (voltages (m,), time in s) end.
 
-    ``key`` is asked before each frame: "b" goes back to the press before, "s" leaves a place out,
-    "q" ends.
+    ``key`` is asked before each frame: "b" goes back to the previous press, "s" skips a place, "q"
+    quits.
     """
     if guide.step is not Step.DONE:
         say(GuideEvent(guide.step, guide.number, Step.REST.value))

@@ -1,13 +1,14 @@
-"""The physics as a kernel: what the fields of a skin's electrodes say of how alike two presses
-answer.
+"""The physics as a kernel: from the fields of a skin's electrodes it follows how similarly the skin
+responds to presses at two places.
 
-A press at p changes row r by about J_r(p) = -E_drive(p) . E_measure(p). How much, with which sign
-and gain, differs on a real instrument from row to row; that places alike in all rows answer alike
-does not. So the answer s_c of row c over the skin is a Gaussian process with the kernel
+A press at p changes row r by about J_r(p) = -E_drive(p) . E_measure(p). On a real instrument, size,
+sign and gain of this change differ from row to row. But places that are similar in all rows respond
+similarly. So the response s_c of row c over the skin is modelled as a Gaussian process with the
+kernel
 
     k_c(p, q) = (1/m) sum_r J_r(p) J_r(q) + g J_c(p) J_c(q).
 
-The first term leaves a turn by one electrode open; the second, the row's own, fixes it.
+The first term does not determine a rotation by one electrode; the second term, the row's own, does.
 """
 
 from collections.abc import Callable
@@ -30,20 +31,21 @@ FIELD_PIXELS, FIELD_ELEMENTS = 64, 6000
 
 @dataclass(frozen=True)
 class Placement:
-    """How the places lie against the skin as described: mirrored in y first where ``mirrored``,
-    then turned by ``turn_deg`` counterclockwise about the outline's centre and scaled."""
+    """The position of the places relative to the skin as described: first mirrored in y if
+    ``mirrored``, then turned counterclockwise by ``turn_deg`` about the outline's centre, and
+    scaled."""
 
     turn_deg: float = 0.0
     scale: float = 1.0
     mirrored: bool = False
 
     def to_skin(self, place_mm: FloatArray, centre_mm: tuple[float, float]) -> FloatArray:
-        """Places (n, 2) in the description's coordinates."""
+        """Return places (n, 2) in the coordinates of the description."""
         away = (place_mm - centre_mm) * (1, -1 if self.mirrored else 1)
         return np.asarray(centre_mm + self.scale * away @ rotation(self.turn_deg).T)
 
     def skin_in_places(self, skin: Skin) -> Skin:
-        """The skin as the places see it."""
+        """Return the skin in the coordinates of the places."""
         outline, electrodes = skin.outline, skin.electrodes
         if outline.diameter_mm is not None:
             moved = disk(outline.diameter_mm / self.scale)
@@ -67,14 +69,14 @@ class Placement:
 
 
 def rotation(turn_deg: float) -> FloatArray:
-    """The matrix (2, 2) of a turn counterclockwise."""
+    """Return the matrix (2, 2) of a counterclockwise rotation."""
     c, s = cos(radians(turn_deg)), sin(radians(turn_deg))
     return np.array([[c, -s], [s, c]])
 
 
 def field_sensitivity(skin: Skin, protocol: Protocol) -> Sensitivity:
-    """J of ``skin`` as described: products of its electrodes' fields, between pixels linear,
-    outside the outline as at its nearest pixel; of rms 1."""
+    """Return J of ``skin`` as described: products of its electrodes' fields, linear between pixels,
+    with the value of the nearest pixel outside the outline, scaled to rms 1."""
     from eitskin.fem.cem import ForwardModel
     from eitskin.fem.fields import electrode_fields
     from eitskin.fem.mesh import mesh_for_elements
@@ -99,17 +101,18 @@ def field_sensitivity(skin: Skin, protocol: Protocol) -> Sensitivity:
 
 
 def matern(p: FloatArray, q: FloatArray, length_mm: float) -> FloatArray:
-    """The stationary kernel of smoothness 5/2, (n, k): what is left without a description."""
+    """Return the stationary kernel of smoothness 5/2, (n, k), for use without a description."""
     r = np.sqrt(5) / length_mm * np.linalg.norm(p[:, None] - q[None], axis=-1)
     return np.asarray((1 + r + r**2 / 3) * np.exp(-r))
 
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """The kernel of places. ``sensitivity`` None: Matern 5/2 of ``length_mm`` times the scale.
+    """The kernel of places. With ``sensitivity`` None it is Matern 5/2 with ``length_mm`` times the
+    scale.
 
-    ``placement``, ``own`` (g) and ``noise`` (lambda) are what the likelihood chooses; the kernel's
-    mean over the places in ``scaled_to`` is 1, each row's own term likewise.
+    The likelihood chooses ``placement``, ``own`` (g) and ``noise`` (lambda). ``condition`` scales
+    the kernel to a mean of 1 over the places, and each row's own term likewise.
     """
 
     sensitivity: Sensitivity | None
@@ -120,24 +123,25 @@ class Kernel:
     noise: float = 0.03
 
     def features(self, place_mm: FloatArray) -> FloatArray:
-        """J at places (n, 2): (n, m); for the stationary kernel (n, 0)."""
+        """Return J at places (n, 2), (n, m); for the stationary kernel (n, 0)."""
         if self.sensitivity is None:
             return np.zeros((len(place_mm), 0))
         return self.sensitivity(self.placement.to_skin(place_mm, self.centre_mm))
 
     def common(self, p: FloatArray, q: FloatArray, jp: FloatArray, jq: FloatArray) -> FloatArray:
-        """The part that all rows share, (n, k), not yet scaled."""
+        """Return the part that all rows share, (n, k), before scaling."""
         if self.sensitivity is None:
             return matern(p, q, self.length_mm * self.placement.scale)
         return np.asarray(jp @ jq.T / jp.shape[1])
 
 
 def least_turn_deg(turn_deg: float, digits: int = 1) -> float:
-    """The same direction as -180 to 180 degrees, rounded; never -0."""
+    """Return the same direction within -180 to 180 degrees, rounded; never -0."""
     return round((turn_deg + 180) % 360 - 180, digits) + 0.0
 
 
 def placement_text(placement: Placement) -> str:
+    """Return the placement in words."""
     turn = least_turn_deg(placement.turn_deg)
     return (
         (f"turned by {turn:.1f} degrees" if turn else "not turned")

@@ -1,6 +1,9 @@
-"""What a taught model knows, read back from its file: the answer of every row to a press anywhere,
-and the noise. P = U'W / s_1 and S = diag(s / s_1) V' of W s D = U s V' with R = W'W / s_1^2 stored
-give s = R^-1 P' S / D up to what lies beyond the model's rank."""
+"""Read back what a taught model knows: the response of every row to a press anywhere, and the
+noise.
+
+With P = U'W / s_1, S = diag(s / s_1) V', W s D = U s V' and the stored R = W'W / s_1^2, the
+response is s = R^-1 P' S / D, except for the part beyond the model's rank.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,8 +18,9 @@ from eitskin.model.model import Model
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """``answer`` (n_pixels, m) V of a press of amplitude 1 at each pixel of ``grid``; ``noise``
-    (m, m) V^2, its covariance; ``presses``: how many taught it."""
+    """``answer`` (n_pixels, m) in V is the response to a press of amplitude 1 at each pixel of
+    ``grid``; ``noise`` (m, m) in V^2 is the covariance of the noise; ``presses`` is the number of
+    presses that taught it."""
 
     grid: Grid
     answer: FloatArray
@@ -24,15 +28,19 @@ class Known:
     presses: int
 
     def at(self) -> Callable[[FloatArray], FloatArray]:
-        """The answer (k, m) at places (k, 2)."""
+        """Return a function that gives the responses (k, m) at places (k, 2)."""
         return between_pixels(self.grid, self.answer)
 
 
 def known_of(model: Model, where: str) -> Known:
-    """What ``model`` was taught; ``where`` names it in errors."""
+    """Return what ``model`` was taught; ``where`` names it in errors.
+
+    Raises:
+        ModelError: the model was not taught.
+    """
     if model.precision is None or "teach" not in model.meta:
         raise ModelError(
-            f"{where}: a model from physics, which no press has taught; make one with  eitskin"
+            f"{where}: this model comes from physics and was not taught; make one with  eitskin"
             " teach fit"
         )
     rows = model.protocol.n_rows

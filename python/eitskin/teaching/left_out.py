@@ -1,5 +1,4 @@
-"""What the presses say of each other: where the others alone would put each, how surely, and
-whether it fits them."""
+"""Leave each press out: where the others place it, how certainly, and whether it fits them."""
 
 from dataclasses import dataclass
 
@@ -10,17 +9,18 @@ from eitskin.arrays import FloatArray, IntArray
 from eitskin.fem.grid import Grid
 from eitskin.teaching.fit import PLACE_KEPT, PLACE_ROUNDS, Learned, learn
 
-CHI2_90 = 4.605  # the .9 quantile of two squared normal numbers
-MISFIT = 4.0  # times the median: a press that does not fit the others
-MOST_OF_NOISE = 0.95  # that one press's residual may be of the noise along itself
-TEMPERATURE = 2.0  # of scores as probabilities: residuals are heavier than normal
+CHI2_90 = 4.605  # the .9 quantile of chi squared with two degrees of freedom
+MISFIT = 4.0  # in medians; a press with a greater misfit does not fit the others
+MOST_OF_NOISE = 0.95  # greatest share of one press's residual in the noise along itself
+TEMPERATURE = 2.0  # for scores as probabilities, because residuals have heavier tails than normal
 
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """n presses, each placed by the others: ``place_mm`` (n, 2); ``error_mm`` (n,);
-    ``score`` (n, k) on the grid, chi^2 less its least; ``misfit`` (n,) the residual at the press's
-    given place over the median; ``explained`` (m,) of each row's energy."""
+    """n presses, each placed by the others. ``place_mm`` is (n, 2), ``error_mm`` is (n,), and
+    ``score`` (n, k) is chi^2 minus its least value on the grid. ``misfit`` (n,) is the residual at
+    the press's given place over the median. ``explained`` (m,) is the explained fraction of each
+    row's energy."""
 
     place_mm: FloatArray
     error_mm: FloatArray
@@ -30,8 +30,9 @@ class LeftOut:
 
 
 def leave_one_out(learned: Learned, grid: Grid) -> LeftOut:
-    """Place each press by the others, at the least of |W (y - a s(q))|^2 over q and a > 0; W, too,
-    is that of the others' residuals; not for ``score``, whose ``TEMPERATURE`` was chosen so."""
+    """Place each press by the others, at the minimum of |W (y - a s(q))|^2 over q and a > 0. W is
+    also made from the others' residuals, except for ``score``, for which ``TEMPERATURE`` was chosen
+    with the full W."""
     process, whitening = learned.process, learned.noise.whitening
     at = grid.centres_mm()
     mean = process.mean(at)
@@ -58,32 +59,34 @@ def leave_one_out(learned: Learned, grid: Grid) -> LeftOut:
 
 
 def chance_share(left_out_mm: FloatArray, place_mm: FloatArray) -> float:
-    """How far the others put each press (n, 2) from its own place, over how far from theirs: near 0
-    where places explain the voltages, about 1 where they do not."""
+    """Return how far the others place each press (n, 2) from its own place, relative to the
+    distance from their places: near 0 if places explain the voltages, about 1 if they do not."""
     away = np.linalg.norm(left_out_mm[:, None] - place_mm, axis=2)
     own = float(np.diag(away).mean())
     return own * (len(away) - 1) / max(float(away.mean()) * len(away) - own, 1e-300)
 
 
 def without_own(residual: FloatArray, share: float, data: FloatArray) -> FloatArray:
-    """What to add to whitened data (k, m), so that they are whitened by a covariance without the
-    ``share`` that one press's whitened ``residual`` r (m,) has of it: by (I - share r r')^-1/2."""
+    """Return what to add to whitened data (k, m) so that they are whitened by a covariance without
+    the ``share`` that the whitened ``residual`` r (m,) of one press contributes: multiplication by
+    (I - share r r')^-1/2."""
     energy = max(float(residual @ residual), 1e-300)
     factor = 1 / np.sqrt(1 - min(share * energy, MOST_OF_NOISE)) - 1
     return np.outer(data @ residual, residual * (factor / energy))
 
 
 def ellipse_factor(mahalanobis2: FloatArray) -> float:
-    """What the covariance of a place is multiplied by, so that 90 % ellipses cover 90 % of new
-    presses: split conformal, the ceil(.9 (n + 1))-th least of ``mahalanobis2`` (n,)."""
+    """Return the factor for the covariance of a place with which 90 % ellipses cover 90 % of new
+    presses (split conformal): it is from the ceil(.9 (n + 1))-th least of ``mahalanobis2`` (n,)."""
     count = len(mahalanobis2)
     rank = min(int(np.ceil(0.9 * (count + 1))), count)
     return float(np.sort(mahalanobis2)[rank - 1] / CHI2_90)
 
 
 def _scores(answer: FloatArray, seen: FloatArray) -> FloatArray:
-    """chi^2 (k,) less its least of whitened data (m,) as a press at each of k places with whitened
-    answers (k, m). The noise's scale is the press's own: what is left at its best place."""
+    """Return chi^2 (k,) minus its least value, for whitened data (m,) explained as a press at each
+    of k places with whitened responses (k, m). The scale of the noise is the press's own: its
+    residual at the best place."""
     energy = np.maximum(np.sum(answer**2, axis=1), 1e-300)
     score = seen @ seen - np.maximum(answer @ seen, 0) ** 2 / energy
     scale = max(float(score.min()) / max(len(seen) - 3, 1), 1.0)
@@ -91,12 +94,13 @@ def _scores(answer: FloatArray, seen: FloatArray) -> FloatArray:
 
 
 def _middle(score: FloatArray, at: FloatArray) -> FloatArray:
-    """Mean (2,) of a press's place by its scores on the grid."""
+    """Return the mean place (2,) of a press by its scores on the grid."""
     chance = np.exp(-0.5 * np.minimum(score, 1400))
     return np.asarray(chance @ at / chance.sum())
 
 
 def stranger_note(strangers: IntArray) -> str:
+    """Return a note about presses that do not fit the others."""
     return (
         "presses that do not fit the others (two fingers at once, a slip, a wrong place); leave"
         " them out or record them again: " + ", ".join(map(str, strangers[:12]))
@@ -112,8 +116,8 @@ def refined_places(
     depth: FloatArray | None,
     width_mm: float,
 ) -> Learned:
-    """Places given by hand with an error of ``sd_mm`` an axis, drawn to where the other presses put
-    them; the answers learned again with them."""
+    """Move places that were given by hand, with an error of ``sd_mm`` per axis, towards where the
+    other presses put them, and learn the responses again."""
     at = grid.centres_mm()
     prior = -0.5 * np.sum((at[None] - given_mm[:, None]) ** 2, axis=2) / sd_mm**2
     for round_ in range(PLACE_ROUNDS):

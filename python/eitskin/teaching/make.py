@@ -1,4 +1,4 @@
-"""What was learned as an ordinary model, and what its presses say of it when they are left out."""
+"""Turn what was learned into an ordinary model."""
 
 from dataclasses import replace
 from typing import Any
@@ -20,13 +20,14 @@ from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.teaching.fit import Learned
 
 RANK = 64
-LAMBDA_REL = 0.2  # of the image alone: touches are sought in the data
-# of |y|^2 that each touch must explain beside the others
+LAMBDA_REL = 0.2  # only for the image, since touches are found in the data
+# candidates for the fraction of |y|^2 that each touch must explain in addition to the others
 LEAST_SHARES = (0.01, 0.013, 0.016, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06, 0.08, 0.12)
 
 
 def taught_defaults(grid: Grid, least_share: float) -> Defaults:
-    """What suits a taught model: exact solutions, discs of a pixel sought in the data."""
+    """Return defaults for a taught model: exact solutions, and discs of one pixel that are found in
+    the data."""
     return Defaults(
         iterations=200,
         lambda_rel=LAMBDA_REL,
@@ -43,7 +44,7 @@ def taught_defaults(grid: Grid, least_share: float) -> Defaults:
 
 
 def _precision(learned: Learned, s1: float) -> npt.NDArray[np.float32]:
-    """The lower triangle of R = W'W over s_1^2, by rows."""
+    """Return the lower triangle of R = W'W over s_1^2, row by row."""
     white = learned.noise.whitening / learned.unit / s1
     return np.asarray((white.T @ white)[np.tril_indices(white.shape[0])], dtype=np.float32)
 
@@ -57,8 +58,9 @@ def taught_model(
     meta: dict[str, Any] | None = None,
     rank: int = RANK,
 ) -> Model:
-    """The model of ``learned`` on ``grid``: P = U'W / s_1, S = diag(s / s_1) V' of S_w D = U s V',
-    S_w = W s(grid), D = 1 / |column|. ``untouched`` (n, m) V gives the reference."""
+    """Return the model of ``learned`` on ``grid``: P = U'W / s_1 and S = diag(s / s_1) V' from S_w
+    D = U s V', with S_w = W s(grid) and D = 1 / |column|. ``untouched`` (n, m) in V gives the
+    reference."""
     rows = protocol.n_rows
     answer = learned.noise.whitening @ learned.process.mean(grid.centres_mm()).T
     norm = np.linalg.norm(answer, axis=0)

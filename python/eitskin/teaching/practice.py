@@ -1,5 +1,5 @@
-"""A scene in which a finger presses where a plan says, one press after another, at the pace of a
-quick person: to try teaching without a skin."""
+"""A scene in which a finger presses the places of a plan, one after another, at the pace of a quick
+person, to try teaching without a skin."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ RADIUS_PER_SIZE = 0.04
 
 
 def practice_scene(skin: Skin, path: Path, plan: PressPlan) -> str:
-    """The scene's TOML for ``skin``, whose description is the file ``path``."""
+    """Return the TOML of the scene for ``skin``, whose description is the file ``path``."""
     low_x, low_y, high_x, high_y = skin.outline.bounding_box_mm
     radius = RADIUS_PER_SIZE * max(high_x - low_x, high_y - low_y)
     period = REST_S + PRESS_S
@@ -49,8 +49,8 @@ def practice_scene(skin: Skin, path: Path, plan: PressPlan) -> str:
 
 
 def plan_of_scene(name: str) -> tuple[PressPlan, str]:
-    """Where the touches of a scene, a file or one of the library, press, and the text of its skin's
-    description; empty for the paper's."""
+    """Return the places that the touches of a scene (a file, or one of the library) press, and the
+    text of its skin's description, empty for the paper's skin."""
     path = scene_path(name)
     scene = load_scene(path)
     first = sorted((track.keyframes[0] for track in scene.touches), key=lambda one: one.t_s)

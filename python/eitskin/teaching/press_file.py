@@ -1,4 +1,4 @@
-"""The presses of a session on disk, as they come."""
+"""The presses of a session on disk, saved as they are made."""
 
 import os
 from dataclasses import replace
@@ -18,39 +18,46 @@ SAME_PLACE_MM = 0.02
 
 
 class PressFile:
-    """The presses of a session on disk, whole after each: one that is killed goes on later where it
-    stopped; ``anew``: an earlier file is written over with the first press. ``following`` is the
-    place after the last that is there. Locked against other recorders until it is closed.
+    """The file is complete after each press: a session that was killed can continue where it
+    stopped. With ``start_again`` the first press overwrites an earlier file. ``following`` is the
+    place after the last recorded one. The file is locked against other recorders until it is
+    closed.
 
     Raises:
-        FrameError: an earlier file has another protocol, or places that are not the plan's.
-        FileError: it cannot be read or written, or another process records to it.
+    FrameError: an earlier file has another protocol, or places that are not in the plan.
+    FileError: the file cannot be read or written, or another process records to it.
     """
 
     def __init__(
-        self, path: Path, plan: PressPlan, protocol: Protocol, skin: str, *, anew: bool = False
+        self,
+        path: Path,
+        plan: PressPlan,
+        protocol: Protocol,
+        skin: str,
+        *,
+        start_again: bool = False,
     ) -> None:
         self.path, self.plan, self.protocol, self.skin = path, plan, protocol, skin
-        self._held: IO[bytes] | None = None
+        self._locked: IO[bytes] | None = None
         self.numbers: list[int] = []
         if path.is_file():
-            self._held = path.open("rb")
-            if not locked(self._held):
+            self._locked = path.open("rb")
+            if not locked(self._locked):
                 self.close()
                 raise FileError(
                     f"{path}: another process records to it; stop that, or name another file"
                 )
         try:
-            self.presses = load_presses(path) if path.exists() and not anew else None
+            self.presses = load_presses(path) if path.exists() and not start_again else None
             self._find_places()
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
-        """Let others record to it; may be called twice."""
-        if self._held is not None:
-            self._held.close()
+        """Release the lock. It may be called twice."""
+        if self._locked is not None:
+            self._locked.close()
 
     def _find_places(self) -> None:
         path, plan, protocol = self.path, self.plan, self.protocol
@@ -72,7 +79,7 @@ class PressFile:
         return self.numbers[-1] + 1 if self.numbers else 0
 
     def add(self, number: int, untouched: FloatArray, pressed: FloatArray, time_s: float) -> None:
-        """One more press, at place ``number``; on disk when this returns."""
+        """Add a press at place ``number``; it is on disk when this returns."""
         one = np.array([number])
         new = Presses(
             self.protocol, untouched[None], pressed[None], self.plan.place_mm[one],
@@ -89,15 +96,15 @@ class PressFile:
         self.numbers.append(number)
 
     def _save(self, presses: Presses) -> None:
-        """Write them; the new file is locked before it has its name."""
+        """Write the presses; the new file is locked before it gets its name."""
         if self.path.is_file():
-            ours = self._held is not None and os.path.samestat(
-                self.path.stat(), os.fstat(self._held.fileno())
+            ours = self._locked is not None and os.path.samestat(
+                self.path.stat(), os.fstat(self._locked.fileno())
             )
             if not ours:
                 raise FileError(
-                    f"{self.path}: another program wrote it meanwhile; this press is not in it;"
-                    " name another file"
+                    f"{self.path}: another program changed it meanwhile, and this press was not"
+                    " saved; name another file"
                 )
         with write_beside(self.path) as temporary:
             stream = temporary.open("wb")
@@ -109,10 +116,10 @@ class PressFile:
                 stream.close()
                 raise
         self.close()
-        self._held = stream
+        self._locked = stream
 
     def back(self) -> int:
-        """Forget the last press; returns its place, 0 where there was none."""
+        """Remove the last press; return its place, or 0 if there was none."""
         if self.presses is None:
             return 0
         number = self.numbers.pop()

@@ -15,7 +15,7 @@ from eitskin.skin.protocol import Protocol, table
 
 FORMAT, VERSION = "eitskin-presses", 1
 MAX_PRESSES = 20_000
-MAX_BYTES = 400_000_000  # unpacked
+MAX_BYTES = 400_000_000  # after unpacking
 MAX_TEXT = 1_000_000
 MAX_MM = 1e5
 ARRAYS = {"untouched": 2, "pressed": 2, "place_mm": 2, "drive_measure": 2}
@@ -25,15 +25,15 @@ WORDS = ("format", "version", "n_electrodes", "current_a", "skin")
 
 @dataclass(frozen=True, eq=False)
 class Presses:
-    """n presses of a scan of m rows.
+    """n presses with a scan of m rows.
 
-    ``untouched`` and ``pressed`` (n, m) V: the frame just before each press, and during it; any
-    other unit does as well. ``place_mm`` (n, 2) of the press's centre. ``depth_mm`` or ``force_n``
-    (n,), at least 0, NaN where a press has none; ``time_s`` (n,) from any start. ``skin``: the text
-    of the skin's description (TOML), empty where unknown.
+    ``untouched`` and ``pressed`` (n, m) are the frames just before and during each press, in V or
+    any other unit. ``place_mm`` (n, 2) is the centre of each press. ``depth_mm`` or ``force_n``
+    (n,) is at least 0, or NaN if unknown. ``time_s`` (n,) counts from any start. ``skin`` is the
+    text of the skin's description (TOML), or empty.
 
     Raises:
-        FrameError: a shape disagrees, there are no presses or too many, or a number cannot be.
+    FrameError: a shape is wrong, there are no presses or too many, or a number is not valid.
     """
 
     protocol: Protocol
@@ -69,11 +69,11 @@ class Presses:
 
     @property
     def difference(self) -> FloatArray:
-        """Pressed less untouched, (n, m) V."""
+        """Pressed minus untouched frames, (n, m) in V."""
         return np.asarray(self.pressed - self.untouched)
 
     def take(self, which: npt.ArrayLike) -> "Presses":
-        """Some of them, by number or by a mask (n,)."""
+        """Return the presses that ``which`` selects, by number or as a mask (n,)."""
         k = np.asarray(which)
         parts: dict[str, Any] = {}
         for name in ("untouched", "pressed", "place_mm", *OPTIONAL):
@@ -115,7 +115,8 @@ def _refuse_numbers(presses: Presses) -> None:
 
 
 def shifted(presses: Presses, by: int) -> Presses:
-    """Each press with the place, depth and force of the one ``by`` later; the ends go."""
+    """Return each press with the place, depth and force of the press ``by`` later; presses at the
+    ends are dropped."""
     count = np.arange(len(presses) - abs(by))
     frames, places = presses.take(count + max(-by, 0)), presses.take(count + max(by, 0))
     return replace(
@@ -124,17 +125,22 @@ def shifted(presses: Presses, by: int) -> Presses:
 
 
 def aged(presses: Presses, by: int) -> Presses:
-    """Each press with the untouched frame of the one ``by`` earlier, the first ones with one as
-    much later; they are in order of time."""
+    """Return each press with the untouched frame of the press ``by`` earlier, or, for the first
+    ones, ``by`` later. Presses must be in order of time."""
     count = np.arange(len(presses))
     other = np.where(count < by, np.minimum(count + by, count[-1]), count - by)
     return replace(presses, untouched=presses.untouched[other])
 
 
 def joined(first: Presses, second: Presses) -> Presses:
-    """The presses of both, one after the other; what only one has becomes NaN, time goes."""
+    """Return the presses of both, one after the other. What only one has becomes NaN for the other;
+    times are dropped.
+
+    Raises:
+        FrameError: the protocols differ.
+    """
     if first.protocol.hash != second.protocol.hash:
-        raise FrameError("presses: made with different protocols; teach them apart")
+        raise FrameError("presses: made with different protocols; teach them separately")
     optional: dict[str, Any] = {"time_s": None}
     for name in ("depth_mm", "force_n"):
         both = [(one, getattr(one, name)) for one in (first, second)]
@@ -151,17 +157,17 @@ def joined(first: Presses, second: Presses) -> Presses:
 
 
 def save_presses(path: str | Path, presses: Presses) -> None:
-    """Write them to ``path``, whole or not at all.
+    """Write the presses to ``path``, completely or not at all.
 
     Raises:
-        FileError: it cannot be written.
+        FileError: the file cannot be written.
     """
     with write_beside(path) as temporary, temporary.open("wb") as stream:
         write_presses(stream, presses)
 
 
 def write_presses(stream: IO[bytes], presses: Presses) -> None:
-    """Write them to an open file."""
+    """Write the presses to an open file."""
     optional = {n: getattr(presses, n) for n in OPTIONAL if getattr(presses, n) is not None}
     np.savez_compressed(
         stream, format=FORMAT, version=VERSION, n_electrodes=presses.protocol.n_electrodes,
@@ -172,11 +178,11 @@ def write_presses(stream: IO[bytes], presses: Presses) -> None:
 
 
 def load_presses(path: str | Path) -> Presses:
-    """The presses in ``path``. A plain .npz with untouched, pressed, place_mm and drive_measure
-    does as well.
+    """Read the presses in ``path``. A plain .npz with untouched, pressed, place_mm and
+    drive_measure is accepted too.
 
     Raises:
-        FileError: it cannot be read.
+        FileError: the file cannot be read.
         FrameError, ProtocolError: it holds something else; the text names the file.
     """
     wanted = (*ARRAYS, *OPTIONAL, *WORDS)
@@ -197,7 +203,7 @@ def _checked(found: dict[str, Any]) -> Presses:
     if absent:
         raise FrameError(
             f"presses: no array {absent[0]!r}; each press needs the untouched frame just before it,"
-            " the pressed one, its place_mm, and the file a drive_measure"
+            " the pressed frame and its place_mm, and the file needs a drive_measure"
             if absent[0] == "untouched"
             else f"presses: no array {absent[0]!r}; see docs/reference/presses-format.md"
         )

@@ -1,10 +1,11 @@
-"""The answers of all rows to a press anywhere, learned from presses: Gaussian processes with one
+"""The responses of all rows to a press anywhere, learned from presses: Gaussian processes with one
 kernel, solved together.
 
-y_c = a o s_c(places) + noise of variance lambda, a the presses' amplitudes, each row over its own
-rms; s_c is about 0, or with ``about_own`` about its own-row feature. A = a a' o K + lambda I is
-factored once; each row's own term is of rank one (Sherman and Morrison). Leaving a press out costs
-nothing more: its residual is A^-1 (y - a o mean) / diag(A^-1).
+y_c = a o s_c(places) + noise of variance lambda, where a are the amplitudes of the presses and each
+row is over its own rms. The prior mean of s_c is 0, or, with ``about_own``, the feature of its own
+row. A = a a' o K + lambda I is factored once; the own-row term of each row has rank one (Sherman
+and Morrison). Leaving a press out costs nothing more: its residual is A^-1 (y - a o mean) /
+diag(A^-1).
 """
 
 from dataclasses import dataclass
@@ -17,8 +18,8 @@ from eitskin.teaching.kernel import Kernel
 
 @dataclass(frozen=True, eq=False)
 class Process:
-    """The processes after n presses: ``weight`` A_c^-1 y_c (n, m), ``own_solved`` A^-1 (a o j_c)
-    sqrt(g) (n, m), ``own_gain`` its denominators (m,), ``inverse`` A^-1 (n, n)."""
+    """The processes after n presses. ``weight`` is A_c^-1 y_c (n, m), ``own_solved`` is A^-1 (a o
+    j_c) sqrt(g) (n, m) with the denominators ``own_gain`` (m,), and ``inverse`` is A^-1 (n, n)."""
 
     kernel: Kernel
     place_mm: FloatArray
@@ -35,7 +36,7 @@ class Process:
     about_own: bool = False
 
     def mean(self, q_mm: FloatArray) -> FloatArray:
-        """s (k, m) of a press of amplitude 1 at each of ``q_mm`` (k, 2)."""
+        """Return s (k, m) for a press of amplitude 1 at each of ``q_mm`` (k, 2)."""
         jq = self.kernel.features(q_mm)
         shared, own = self._at(q_mm, jq)
         total = (self.amplitude[:, None] * self._own_data() * self.weight).sum(axis=0)
@@ -43,13 +44,13 @@ class Process:
         return np.asarray(expected + shared @ self.weight + own * total)
 
     def left_out(self) -> FloatArray:
-        """The residuals (n, m) of each press, the others known."""
+        """Return the residual (n, m) of each press when the others are known."""
         diagonal = np.diag(self.inverse)[:, None] - self.own_solved**2 / self.own_gain
         return np.asarray(self.weight / diagonal)
 
     def corrections(self, q_mm: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """h (k, n), v (n, m), w (k, m): without press i the mean at q is less by
-        (h[q, i] + v[i] w[q]) times its left-out residual."""
+        """Return h (k, n), v (n, m), w (k, m). Without press i, the mean at q is smaller by (h[q,
+        i] + v[i] w[q]) times its left-out residual."""
         jq = self.kernel.features(q_mm)
         shared, own = self._at(q_mm, jq)
         return (
@@ -59,7 +60,7 @@ class Process:
         )
 
     def _own_data(self) -> FloatArray:
-        """sqrt(g) j_c of the presses, in units."""
+        """Return sqrt(g) j_c of the presses, in units."""
         if self.kernel.sensitivity is None:
             return np.zeros((len(self.place_mm), self.data.shape[1]))
         return np.asarray(np.sqrt(self.kernel.own) * self.j / self.own_unit)
@@ -81,8 +82,8 @@ def condition(
     data: FloatArray,
     about_own: bool = False,
 ) -> Process:
-    """The processes after presses at ``place_mm`` (n, 2) of ``amplitude`` (n,) with ``data``
-    (n, m), about the own-row feature or 0."""
+    """Return the processes after presses at ``place_mm`` (n, 2) of ``amplitude`` (n,) with ``data``
+    (n, m), with the own-row feature or 0 as prior mean."""
     from scipy.linalg import cho_factor, cho_solve
 
     count = len(place_mm)

@@ -1,11 +1,12 @@
-"""Whether a taught model still fits its skin, from untouched frames alone.
+"""Check from untouched frames alone whether a taught model still fits its skin.
 
-What is compared is the untouched skin now and when it was taught. Two numbers: the correlation of
-the rows, and the distance in the metric of the noise of presses, as a multiple of the change that a
-mean press makes. On a hydrogel skin (DSHardman/HydrogelEIT): own session .9999 at once and .996
-after 400 presses of drying, where the error has grown from 1.2 to 2.1 mm; two other sessions .97
-and .93, 9.5 mm, which an update mends; another skin of the same make 0. Places that were turned or
-shifted do not change an untouched frame, and remain unseen.
+The untouched skin now is compared with the one when it was taught, by two numbers: the correlation
+of the rows, and the distance in the metric of the noise of presses, as a multiple of the change by
+a mean press. For a hydrogel skin (DSHardman/HydrogelEIT), the correlation is .9999 at once in the
+same session, and .996 after 400 presses of drying, when the error has grown from 1.2 to 2.1 mm. For
+two other sessions it is .97 and .93, with an error of 9.5 mm that an update repairs. For another
+skin of the same make it is 0. Turned or shifted places do not change an untouched frame, so they
+are not detected.
 """
 
 from dataclasses import dataclass
@@ -21,14 +22,14 @@ from eitskin.teaching.known import known_of
 
 FITS, UPDATE, TEACH_AGAIN = "fits", "update", "teach again"
 FITS_ABOVE, UPDATE_ABOVE = 0.99, 0.85
-FITS_BELOW = 0.5  # of a press: so little is noise and drift, whatever the correlation
-UPDATE_FROM = 10.0  # presses: one row or electrode may be far off while the correlation is high
+FITS_BELOW = 0.5  # of a press; a smaller distance is noise or drift, whatever the correlation
+UPDATE_FROM = 10.0  # presses; one row or electrode may be wrong although the correlation is high
 
 
 @dataclass(frozen=True)
 class StillFits:
-    """``verdict``; ``correlation`` of the rows; ``distance`` of the whole frame, in presses;
-    ``rule`` says what decided."""
+    """The ``verdict``, the ``correlation`` of the rows, the ``distance`` of the whole frame in
+    presses, and the ``rule`` that decided."""
 
     verdict: str
     correlation: float
@@ -39,13 +40,13 @@ class StillFits:
 def still_fits(
     model: Model, untouched: npt.ArrayLike, protocol: Protocol, *, where: str = "model"
 ) -> StillFits:
-    """Compare untouched frames (n, m) V with those that ``model`` was taught on; of several their
-    median, so that a touch in a few does no harm.
+    """Compare untouched frames (n, m) in V with those that ``model`` was taught on. The median of
+    several frames is used, so that a touch in a few of them does no harm.
 
     Raises:
         ModelError: the model was not taught.
-        ProtocolError: it is of another protocol.
-        FrameError: no frame is whole.
+        ProtocolError: it has another protocol.
+        FrameError: no frame is complete.
     """
     known = known_of(model, where)
     if model.protocol.hash != protocol.hash:
@@ -57,7 +58,7 @@ def still_fits(
     frames = frames[np.isfinite(frames).all(axis=1)]
     if not len(frames):
         raise FrameError(
-            f"{where}: no frame has a number in every row; look at the electrodes with  eitskin"
+            f"{where}: no frame has a number in every row; check the electrodes with  eitskin"
             " doctor"
         )
     now, then = np.median(frames, axis=0), model.v_ref_v.astype(np.float64)
@@ -73,11 +74,11 @@ def still_fits(
 
 def _verdict(correlation: float, distance: float) -> tuple[str, str]:
     if distance < FITS_BELOW:
-        return FITS, f"nearer than {FITS_BELOW:g} of a press"
+        return FITS, f"distance below {FITS_BELOW:g} presses"
     if correlation < UPDATE_ABOVE:
         return TEACH_AGAIN, f"correlation below {UPDATE_ABOVE:g}"
     if correlation < FITS_ABOVE:
         return UPDATE, f"correlation below {FITS_ABOVE:g}"
     if distance > UPDATE_FROM:
-        return UPDATE, f"further than {UPDATE_FROM:g} presses"
-    return FITS, f"correlation from {FITS_ABOVE:g}, nearer than {UPDATE_FROM:g} presses"
+        return UPDATE, f"distance above {UPDATE_FROM:g} presses"
+    return FITS, f"correlation at least {FITS_ABOVE:g}, distance at most {UPDATE_FROM:g} presses"

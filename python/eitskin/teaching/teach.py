@@ -1,4 +1,4 @@
-"""Presses in, a model and an honest report out."""
+"""Teach a model from presses, with a report on its errors."""
 
 import time
 from dataclasses import dataclass, replace
@@ -34,28 +34,30 @@ from eitskin.teaching.left_out import (
 from eitskin.teaching.make import LEAST_SHARES, taught_model
 from eitskin.teaching.presses import Presses, aged
 
-# models, each with the numbers of presses that it did not know
+# models, each with the numbers of the presses that were held out from it
 Tried = list[tuple[Model, IntArray]]
 
 FEW_PRESSES = 50
-FEWEST_LEVELS = 3  # of depth or force, for a law
+FEWEST_LEVELS = 3  # least number of different depths or forces for a law
 FOLDS, MAX_HELD_OUT = 5, 250
-COUNTED_ONCE, LEAST_ONCE = 0.96, 0.93  # of single presses, without sums and with them
-# sums of two held-out presses: so far apart and so near their places, of the skin's width; at most
-# so many a fold; with fewer in all only single presses count
+# least fraction of single presses that must be found as one touch, without sums and with sums
+COUNTED_ONCE, LEAST_ONCE = 0.96, 0.93
+# Sums of two held-out presses simulate two touches. In parts of the skin's width: their least and
+# greatest distance, and the greatest error of a place; then the greatest number per fold, and the
+# least number in all (with fewer only single presses count).
 SUMS_FROM, SUMS_TO, SUM_AT, MAX_SUMS, FEWEST_SUMS = 0.26, 0.41, 0.09, 30, 100
-# of log error by log presses, for what more would bring: few presses show a steeper one that does
-# not last. Of 20 to 400 hydrogel presses -.43 to -.26
+# The limits of the slope of log error over log presses, for predictions: few presses show a steeper
+# slope that does not last. For 20 to 400 hydrogel presses it is -.43 to -.26.
 SLOPES = (-0.35, -0.15)
-NOTHING = 0.1  # of a row's energy explained: it carries nothing
-OTHER_SCALE = 0.16  # of its logarithm: more is another unit or another skin
+NOTHING = 0.1  # explained fraction of a row's energy below which the row is useless
+OTHER_SCALE = 0.16  # a greater |log scale| means another unit or another skin
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Presses solved by the C core with models that did not know them: error (k,) mm of the
-    strongest touch, how many touches, strength of the strongest, the error's square in the
-    covariance by the fit (inf where there is none), and which presses they are."""
+    """Presses solved by the C core with models from which they were held out: the error (k,) in mm
+    of the strongest touch, the number of touches, the strength of the strongest, the squared error
+    in the covariance of the fit (inf if there is none), and the numbers of the presses."""
 
     error_mm: FloatArray
     count: IntArray
@@ -66,8 +68,8 @@ class HeldOut:
 
 @dataclass(frozen=True, eq=False)
 class Taught:
-    """A taught ``model``, what was ``learned``, each press ``left_out``, some ``held`` out and
-    solved by the core, and the ``report``."""
+    """A taught ``model``, what was ``learned``, each press ``left_out``, some presses ``held`` out
+    and solved by the core, and the ``report``."""
 
     model: Model
     learned: Learned
@@ -85,14 +87,17 @@ def teach(
     refuse: bool = True,
     progress: Progress = silent,
 ) -> Taught:
-    """Learn a model from ``presses`` of ``skin``; None where it is not known. ``place_sd_mm``: how
-    far places given by hand may be off, an axis. ``reference_age``: how many presses old the
-    reference will be, in order of time; so much drift counts as noise, and presses held out are
-    solved so. ``refuse`` False makes a model even of places that do not explain the voltages.
+    """Learn a model from ``presses`` of ``skin`` (None if unknown).
+
+    ``place_sd_mm`` is the standard deviation per axis of places given by hand. ``reference_age`` is
+    how old the reference will be, in presses in order of time: the drift over this age counts as
+    noise, and held-out presses are solved with such a reference. With ``refuse`` False a model is
+    made even if the places do not explain the voltages.
 
     Raises:
-        FrameError: the presses cannot teach; the text says which, and what to do.
+        FrameError: the presses cannot teach; the text states which, and what to do.
         ProtocolError: ``skin`` has another number of electrodes.
+        UsageError: a number is out of range.
         MissingExtraError: scipy or netgen is not installed.
     """
     begun = time.monotonic()
@@ -137,9 +142,9 @@ def teach(
 def solve_presses(
     model: Model, presses: Presses, **options: object
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """By the C core with ``options``, each against its own untouched frame: error (n,) mm of the
-    strongest touch (the skin's width for none), number of touches, its strength, and the error's
-    square in the touch's own covariance (inf where that is not known)."""
+    """Solve presses by the C core with ``options``, each with its own untouched frame. Return the
+    error (n,) in mm of the strongest touch (the skin's width if there is none), the number of
+    touches, its strength, and the squared error in the touch's own covariance (inf if unknown)."""
     core = Reconstructor(model)
     core.set_options(**options)
     width = width_of(model)
@@ -158,7 +163,8 @@ def solve_presses(
 
 
 def squared(away_mm: FloatArray, touch: Touch) -> float:
-    """``away_mm`` (2,) of a place in the touch's covariance; inf where that is not known."""
+    """Return the squared length of ``away_mm`` (2,) in the covariance of the touch's place; inf if
+    that is unknown."""
     if not touch.x_variance_mm2:
         return np.inf
     xy = touch.xy_covariance_mm2 or 0.0
@@ -169,7 +175,7 @@ def squared(away_mm: FloatArray, touch: Touch) -> float:
 def model_without(
     found: Explained, kept: IntArray, reference_age: int, least_share: float
 ) -> Model:
-    """A model of the presses ``kept`` with the kernel of all, and the drift of all."""
+    """Return a model of the presses ``kept``, with the kernel and the drift of all presses."""
     presses, process, given = found.presses, found.learned.process, known_size(found.presses)
     less = learn(
         process.kernel, process.place_mm[kept], presses.difference[kept],
@@ -183,8 +189,8 @@ def model_without(
 def held_out(
     found: Explained, judged: Presses, reference_age: int, progress: Progress
 ) -> tuple[float, HeldOut]:
-    """The least share that a touch must explain, by presses held out in five folds, each as
-    ``judged`` has it; and what the core gives for them with it."""
+    """Return the least share that a touch must explain, chosen on presses held out in five folds,
+    each as in ``judged``; and the results of the core for them with it."""
     count = len(judged)
     fold = np.random.default_rng(1).permutation(count) % min(FOLDS, count)
     limit = MAX_HELD_OUT // FOLDS
@@ -196,11 +202,11 @@ def held_out(
 
 
 def chosen_share(tried: Tried, presses: Presses) -> tuple[float, HeldOut]:
-    """The best of ``LEAST_SHARES`` for presses that a model of ``tried`` did not know, each model
-    for its own of ``presses``; and what the core gives for them with it."""
+    """Return the best of ``LEAST_SHARES`` for presses that are held out, each model of ``tried``
+    with its own of ``presses``; and the results of the core for them with it."""
     sums = [near_sums(presses.place_mm[which], width_of(one)) for one, which in tried]
     few = sum(map(len, sums)) < FEWEST_SUMS
-    if few:  # they would decide nothing: the first share that leaves single presses alone is taken
+    if few:  # too few to decide; the first share that keeps single presses single is taken
         sums = [pairs[:0] for pairs in sums]
     found: list[list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]] = []
     alone, two = [], []
@@ -210,11 +216,11 @@ def chosen_share(tried: Tried, presses: Presses) -> tuple[float, HeldOut]:
             defaults = replace(one.defaults, touch_min_fraction=share)
             model, some = replace(one, place_factor=1.0, defaults=defaults), presses.take(which)
             parts.append(solve_presses(model, some))
-            exact.append(told_as_two(model, some, pairs))
+            exact.append(found_as_two(model, some, pairs))
         found.append(parts)
         alone.append(float(np.mean(np.concatenate([part[1] for part in parts]) == 1)))
         two.append(np.concatenate(exact))
-        if alone[-1] >= (COUNTED_ONCE if few else 1):  # more could only lose touches
+        if alone[-1] >= (COUNTED_ONCE if few else 1):  # greater shares could only lose touches
             break
     k = best_share(np.array(alone), np.array(two))
     error, number, strength, mahalanobis2 = (
@@ -226,8 +232,9 @@ def chosen_share(tried: Tried, presses: Presses) -> tuple[float, HeldOut]:
 
 
 def best_share(alone: FloatArray, two: BoolArray) -> int:
-    """Which of k shares is best: ``alone`` (k,) of single presses count as one, ``two`` (k, n) of
-    sums are told as two. With few sums the least that leaves single ones alone."""
+    """Return which of k shares is best, from the fraction ``alone`` (k,) of single presses found as
+    one, and whether sums are found as two, ``two`` (k, n). With few sums it is the least share that
+    keeps single presses single."""
     few = two.shape[1] < FEWEST_SUMS
     enough = np.flatnonzero(alone >= (COUNTED_ONCE if few else LEAST_ONCE))
     if not len(enough):
@@ -236,16 +243,16 @@ def best_share(alone: FloatArray, two: BoolArray) -> int:
 
 
 def near_sums(place_mm: FloatArray, width_mm: float) -> IntArray:
-    """Pairs (k, 2) of presses at ``place_mm`` (n, 2) that the core can just tell apart."""
+    """Return pairs (k, 2) of presses at ``place_mm`` (n, 2) that the core can just separate."""
     away = np.linalg.norm(place_mm[:, None] - place_mm, axis=2) / width_mm
     pairs = np.argwhere(np.triu((away > SUMS_FROM) & (away < SUMS_TO), 1))
     return np.random.default_rng(3).permutation(pairs)[:MAX_SUMS]
 
 
-def told_as_two(model: Model, presses: Presses, pairs: IntArray) -> BoolArray:
-    """Whether the core finds two touches and no more, each at its own, where two of ``presses``,
-    numbered by ``pairs`` (k, 2), are added."""
-    core, told = Reconstructor(model), np.zeros(len(pairs), dtype=bool)
+def found_as_two(model: Model, presses: Presses, pairs: IntArray) -> BoolArray:
+    """Return whether the core finds exactly two touches, each at its place, when two of
+    ``presses``, numbered by ``pairs`` (k, 2), are added."""
+    core, resolved = Reconstructor(model), np.zeros(len(pairs), dtype=bool)
     for k, pair in enumerate(pairs):
         i, j = pair
         core.forget()
@@ -255,20 +262,20 @@ def told_as_two(model: Model, presses: Presses, pairs: IntArray) -> BoolArray:
             at = np.array([(one.x_mm, one.y_mm) for one in touches])
             away = np.linalg.norm(at[:, None] - presses.place_mm[pair], axis=2)
             worst = min(max(away[0, 0], away[1, 1]), max(away[0, 1], away[1, 0]))
-            told[k] = worst < SUM_AT * width_of(model)
-    return told
+            resolved[k] = worst < SUM_AT * width_of(model)
+    return resolved
 
 
 def width_of(model: Model) -> float:
-    """Of the skin, mm."""
+    """Return the width of the skin in mm."""
     return model.grid.pixel_mm * max(model.grid.nx, model.grid.ny)
 
 
 def learning_curve(
     found: Explained, judged: Presses, reference_age: int, least_share: float, held: HeldOut
 ) -> dict[str, float]:
-    """Median error by number of presses: measured with a quarter, a half and four fifths of them,
-    and by that power law what twice and four times as many would bring."""
+    """Return the median error by number of presses: measured with a quarter, a half and four fifths
+    of them, and predicted by that power law for two and four times as many."""
     order, count = np.random.default_rng(2).permutation(len(judged)), len(judged)
     points = {}
     for few in (count // 4, count // 2):
@@ -289,8 +296,8 @@ def learning_curve(
 
 
 def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | None, list[str]]:
-    """The law from strength to force, or where presses have a depth to that, from presses held
-    out."""
+    """Return the law from strength to force (or to depth if only that is known) from held-out
+    presses, and notes."""
     from eitskin.calibration.presses import WeighedPresses
 
     given = known_size(presses)
@@ -305,7 +312,7 @@ def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | Non
             f" least {FEWEST_LEVELS}"
         ]
     reach = float(np.hypot(*grid.centres_mm().T).max())
-    unit = "force in newtons" if presses.force_n is not None else "depth in mm, in place of newtons"
+    unit = "force in newtons" if presses.force_n is not None else "depth in mm instead of newtons"
     try:
         places = presses.place_mm[held.which][good]
         found = calibrate(
@@ -314,7 +321,7 @@ def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | Non
     except EitskinError as error:
         return None, [f"touches have no force: {error}"]
     rms = float(np.sqrt(np.mean((found.left_out * size[good]) ** 2)))
-    return found.law, [f"touches have a force: {unit}; rms of presses held out {rms:.2g}"]
+    return found.law, [f"touches have a force: {unit}; rms error of held-out presses {rms:.2g}"]
 
 
 def _report(
@@ -329,11 +336,11 @@ def _report(
     strangers = np.flatnonzero(left_out.misfit > MISFIT)
     silent = np.flatnonzero(left_out.explained < NOTHING)
     if len(presses) < FEW_PRESSES:
-        notes.append(f"{len(presses)} presses are too few to tell 90 % ellipses")
+        notes.append(f"{len(presses)} presses are too few for 90 % ellipses")
     if abs(np.log(placement.scale)) > OTHER_SCALE:
         notes.append(
-            f"the places suit a skin {1 / placement.scale:.2f} times as large as described; correct"
-            " their unit or the description; the model follows the places"
+            f"the places fit a skin {1 / placement.scale:.2f} times as large as described; correct"
+            " their unit or the description; the model uses the places"
         )
     if len(strangers):
         notes.append(stranger_note(strangers))

@@ -1,14 +1,14 @@
-"""A taught model after remounting or drying, adapted by a few new presses.
+"""Adapt a taught model after remounting or drying, with a few new presses.
 
     s_new,c(p) = (1 + gamma_c) s_old,c(T p) + delta_c(p)
 
-T turns and shifts new places into old ones, gamma_c is the change of row c's gain, delta_c a
-Gaussian process with the physics' kernel. Both are one process (process.py) about the old answer:
-its own-row term is the old answer in place of the physics'.
+T turns and shifts new places into old ones, gamma_c is the change of row c's gain, and delta_c is a
+Gaussian process with the kernel of the physics. Both are one process (process.py) whose prior mean
+is the old response: its own-row term is the old response instead of that of the physics.
 
-Few presses may make a model worse. So each candidate, the old model, the moved one (T alone) and
-the full one, is tried on presses that it did not know, solved by the C core, and a richer one is
-taken only where it is better by more than chance.
+Few presses may make a model worse. So each candidate (the old model, the moved one with T alone,
+and the full one) is tried on held-out presses, solved by the C core, and a richer candidate is used
+only if it is significantly better.
 """
 
 from dataclasses import dataclass, replace
@@ -53,31 +53,34 @@ from eitskin.teaching.teach import Tried, chosen_share, solve_presses
 
 KEPT, MOVED, FULL = "kept", "moved", "full"
 START_TURNS, REFINED_STARTS = 36, 3
-SHIFT_SD = 0.03  # of the skin's width
+SHIFT_SD = 0.03  # relative to the skin's width
 ROUNDS = 3
 MAX_FOLDS = 10
-STRANGE = 6.0  # times the median misfit: no press like the others
-BETTER_BY = 1.0  # standard errors of the mean logarithm of two errors' ratio
-ERROR_FLOOR = 0.01  # of the skin's width: errors below are alike
-SHARE_FROM = 20  # presses: fewer do not tell the least share that a touch must explain
-ODD, SHIFTED = 0.5, 0.5  # of the energy unexplained: places may be shifted; are, where so much less
-STILL_POOR = 3.0  # times the error of the model when it was taught
+STRANGE = 6.0  # in medians; a press with a greater misfit is unlike the others
+BETTER_BY = 1.0  # standard errors of the mean logarithm of the ratio of errors
+ERROR_FLOOR = 0.01  # relative to the skin's width; smaller errors count as equal
+SHARE_FROM = 20  # presses; fewer cannot determine the least share that a touch must explain
+# Places may be shifted if more than ODD of the energy is unexplained; they are if a shift reduces
+# that below SHIFTED times.
+ODD, SHIFTED = 0.5, 0.5
+STILL_POOR = 3.0  # times the error when the model was taught, above which a note is added
 
 
 @dataclass(frozen=True, eq=False)
 class Deviation(Kernel):
-    """The kernel of gamma and delta: ``features``, the own-row term, are the ``old`` answers."""
+    """The kernel of gamma and delta; its ``features``, the own-row term, are the ``old``
+    responses."""
 
     old: Sensitivity | None = None
     move: Move = UNMOVED
 
     def features(self, place_mm: FloatArray) -> FloatArray:
-        """The old answer (n, m) at new places (n, 2)."""
+        """Return the old response (n, m) at new places (n, 2)."""
         assert self.old is not None
         return self.old(self.move.to_old(place_mm, self.centre_mm))
 
     def common(self, p: FloatArray, q: FloatArray, jp: FloatArray, jq: FloatArray) -> FloatArray:
-        """The physics' part, (n, k); the answers ``jp``, ``jq`` are none of it."""
+        """Return the physics' part, (n, k); the responses ``jp`` and ``jq`` are not part of it."""
         a = self.move.to_old(p, self.centre_mm)
         b = a if q is p else self.move.to_old(q, self.centre_mm)
         ja = Kernel.features(self, a)
@@ -86,8 +89,8 @@ class Deviation(Kernel):
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What new presses are held against: ``old`` as it is known, its ``kernel``, the skin's
-    ``width_mm``; ``unit`` (m,) V, the rms of each row's old answer."""
+    """The knowledge that new presses are compared with: the ``old`` knowledge, its ``kernel``, the
+    skin's ``width_mm``, and ``unit`` (m,) in V, the rms of each row's old response."""
 
     old: Known
     kernel: Deviation
@@ -97,7 +100,7 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Updated:
-    """The adapted ``model``, which candidate was ``chosen``, the ``move``, and the ``report``."""
+    """The adapted ``model``, the ``chosen`` candidate, the ``move``, and the ``report``."""
 
     model: Model
     chosen: str
@@ -108,12 +111,12 @@ class Updated:
 def update(
     model: Model, presses: Presses, *, where: str = "model", progress: Progress = silent
 ) -> Updated:
-    """``model`` adapted by new ``presses``; ``where`` names it in errors.
+    """Return ``model`` adapted by new ``presses``; ``where`` names it in errors.
 
     Raises:
         ModelError: ``model`` was not taught.
-        ProtocolError: it is of another protocol.
-        FrameError: the presses cannot teach; the text says which, and what to do.
+        ProtocolError: it has another protocol.
+        FrameError: the presses cannot teach; the text states which, and what to do.
         MissingExtraError: scipy or netgen is not installed.
     """
     old = known_of(model, where)
@@ -138,11 +141,11 @@ def update(
     if by:
         notes.append(shift_note(by))
     if mirrored and chosen != KEPT:
-        notes.append("the new places are mirrored against the old; the model follows the new ones")
+        notes.append("the new places are mirrored relative to the old; the model uses the new ones")
     medians = {how: float(np.median(one)) for how, one in errors.items()}
     if medians[chosen] > STILL_POOR * max(before, ERROR_FLOOR * prior.width_mm):
         notes.append(
-            f"presses held out are still off by {medians[chosen]:.1f} mm; look at the electrodes"
+            f"the error of held-out presses is still {medians[chosen]:.1f} mm; check the electrodes"
             " and whether each press has its own place, then teach again with 50 presses"
         )
     move = UNMOVED if chosen == KEPT else _move(found[chosen])
@@ -193,7 +196,7 @@ def _prior(old: Known, skin: Skin | None, presses: Presses) -> Prior:
 
 
 def _shift(prior: Prior, presses: Presses) -> int:
-    """By how many places the presses are off: 0 where the moved old model explains them."""
+    """Return by how many places the presses are shifted, 0 if the moved old model explains them."""
     as_given = _unexplained(prior, presses)
     if as_given < ODD:
         return 0
@@ -203,7 +206,8 @@ def _shift(prior: Prior, presses: Presses) -> int:
 
 
 def _unexplained(prior: Prior, presses: Presses) -> float:
-    """Of the presses' energy, by the old answers at the likeliest new places."""
+    """Return the fraction of the presses' energy that the old responses at the likeliest new places
+    do not explain."""
     process = min(
         (adapted(one, presses, MOVED) for one in (prior, _mirrored(prior))),
         key=lambda one: -one.log_likelihood,
@@ -216,14 +220,15 @@ def _mirrored(prior: Prior) -> Prior:
 
 
 def _mirrored_or_not(prior: Prior, presses: Presses) -> tuple[Prior, bool]:
-    """``prior``, mirrored where that is far more likely."""
+    """Return ``prior``, mirrored if that is far more likely, and whether it is."""
     other = _mirrored(prior)
     plain, turned = (adapted(one, presses, MOVED).log_likelihood for one in (prior, other))
     return (other, True) if turned > plain + MIRROR_GAIN else (prior, False)
 
 
 def _strangers(prior: Prior, learned: Learned) -> IntArray:
-    """Presses that the others and the old noise do not explain; new noise would hide them."""
+    """Return presses that the others and the old noise do not explain; the new noise would hide
+    them."""
     white = whitening_of(prior.old.noise / prior.unit / prior.unit[:, None])
     misfit = np.sum((learned.process.left_out() @ white.T) ** 2, axis=1)
     return np.flatnonzero(misfit > STRANGE * np.median(misfit))
@@ -235,8 +240,8 @@ def _move(learned: Learned) -> Move:
 
 
 def adapted(prior: Prior, presses: Presses, how: str, start: Deviation | None = None) -> Learned:
-    """The answer after ``presses`` by the candidate ``how``; with ``start`` the likelihood is
-    searched from there alone."""
+    """Return what is learned after ``presses`` by the candidate ``how``; with ``start`` the
+    likelihood is maximised from there alone."""
     data, given = presses.difference / prior.unit, known_size(presses)
     old_noise = prior.old.noise / prior.unit / prior.unit[:, None]
     white = whitening_of(old_noise)
@@ -255,13 +260,13 @@ def adapted(prior: Prior, presses: Presses, how: str, start: Deviation | None = 
 def _amplitudes(
     answer: FloatArray, data: FloatArray, given: FloatArray | None, white: FloatArray
 ) -> FloatArray:
-    """By the old answer alone; 1 is a press of the old ones' mean."""
+    """Return amplitudes by the old response alone; 1 is the mean of the old presses."""
     amplitude = suiting_amplitudes(answer, data, white)
     return amplitude if given is None else by_given(amplitude, given)
 
 
 def _pooled(old: FloatArray, count: int, residual: FloatArray) -> Noise:
-    """The covariance of old presses, ``count`` of them, and new residuals (n, m) together."""
+    """Return the covariance of ``count`` old presses and new residuals (n, m) together."""
     covariance = (count * old + residual.T @ residual) / (count + len(residual))
     return Noise(whitening_of(covariance), covariance, 0.0)
 
@@ -269,8 +274,8 @@ def _pooled(old: FloatArray, count: int, residual: FloatArray) -> Noise:
 def likeliest(
     prior: Prior, presses: Presses, how: str, white: FloatArray, start: Deviation | None
 ) -> Deviation:
-    """The kernel with turn, shift, gain's and noise's variances (over delta's) of the greatest
-    likelihood; ``MOVED`` has noise alone."""
+    """Return the kernel with the turn, shift, and variances of gain and noise (over that of delta)
+    of the greatest likelihood; ``MOVED`` has only the noise."""
     from scipy.optimize import minimize
 
     data, given, place = presses.difference / prior.unit, known_size(presses), presses.place_mm
@@ -325,9 +330,9 @@ def held_out_errors(
     found: dict[str, Learned],
     progress: Progress = silent,
 ) -> tuple[dict[str, FloatArray], dict[str, Tried]]:
-    """Errors (n,) mm of each candidate for presses that it did not know, as the core solves them;
-    of the old model, which knew none, for all. And the models that were tried, each with those
-    presses' numbers."""
+    """Return the errors (n,) in mm of each candidate for held-out presses, solved by the core (for
+    the old model, which knew none, all presses); and the models that were tried, with the numbers
+    of their held-out presses."""
     count = len(presses)
     fold = np.random.default_rng(1).permutation(count) % min(count, MAX_FOLDS)
     errors = {KEPT: solve_presses(model, presses)[0]} | {how: np.zeros(count) for how in found}
@@ -348,7 +353,7 @@ def held_out_errors(
 
 
 def choice(errors: dict[str, FloatArray], floor_mm: float) -> str:
-    """The last candidate that is better than the one chosen before it by more than chance."""
+    """Return the last candidate that is significantly better than the one chosen before it."""
     chosen = KEPT
     for how in (MOVED, FULL):
         gain = np.log((errors[chosen] + floor_mm) / (errors[how] + floor_mm))
@@ -358,8 +363,8 @@ def choice(errors: dict[str, FloatArray], floor_mm: float) -> str:
 
 
 def _law(old: Model, new: Model, move: Move, prior: Prior, presses: Presses) -> LoadLaw | None:
-    """The old law of force where the skin is now, its strengths in the new model's scale: that of
-    presses whose size is known."""
+    """Return the old law of force in the new coordinates, with strengths in the scale of the new
+    model, taken from presses of known size."""
     given = known_size(presses)
     if old.load is None:
         return None

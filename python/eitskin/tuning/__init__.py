@@ -1,2 +1,2 @@
-"""Budgets: the points of the trade-off that nothing beats, and the settings that fit a time or an
-accuracy."""
+"""Measured operating points of the trade-off between accuracy and cost, and the choice of one by a
+preset or by limits."""

@@ -1,4 +1,4 @@
-"""A configuration: every choice between a skin and its touches that trades accuracy for cost, as
+"""A configuration: every setting, from the scan to the touches, that trades accuracy for cost, as
 one frozen value."""
 
 from collections.abc import Mapping
@@ -16,38 +16,39 @@ from eitskin.skin.skin import Skin
 
 SCANS = ("full", "reciprocal")
 PERIOD_SAMPLES = 20
-BASE_SAMPLES = 80  # of a measurement, those of which an SNR is said
+BASE_SAMPLES = 80  # samples per measurement to which a stated SNR refers
 HELD_FRAMES = 4
-ELEMENTS = 3000  # of the mesh that a configuration's model is made on
+ELEMENTS = 3000  # elements of the mesh for the model of a configuration
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """One point of the scale. The defaults are those of a model that ``eitskin model build`` makes,
-    and of a board's scan.
+    """The settings of one operating point. The defaults are those of a model that ``eitskin model
+    build`` makes, and of a board's scan.
 
     Attributes:
-        name: what tables and pictures call it.
-        rank, pixels, storage, regularisation, column_power: of the model: rows of the reduced
-            Jacobian, pixels along the skin's longer side, the type it is stored in, mu and p of the
-            reduction (``eitskin.model.reduction``).
-        solver, iterations, gap, mac_limit: how the image is found; at most ``iterations``, or until
-            the relative duality gap is below ``gap`` (0: never), or at most ``mac_limit``
-            multiply-accumulates (0: no limit) where the core has one.
-        lambda_rel: least lambda over lambda_max; below what the noise asks for it changes nothing.
-        warm_start: each frame begins from the last one's image. Judged at the fourth frame of
-            touches that are held, after others were: what a user sees of touches that rest, not of
-            those that land.
-        touch_sweeps: of the off-grid fit; 0 leaves touches at the image's peaks.
-        touch_fit: parts of the search for touches (``core.results``: straight data 1, regrouping 2,
-            coupling 4).
-        model_errors: whether the model says what it may be wrong by, for row gains and the test of
-            touches: these cost, and keep false touches away on skins unlike the model.
-        second_pass: the image is solved again with the touches' interplay taken out of the data;
-            not over a board's link.
-        samples: of a measurement, at 1 MS/s; white noise falls with the root of them.
-        scan: "full" measures every row, "reciprocal" one of each reciprocal pair, in half the time
-            with sqrt(2) of the noise.
+        name: the name in tables and pictures.
+        rank, pixels, storage, regularisation, column_power: settings of the model: rows of the
+            reduced Jacobian, pixels along the skin's longer side, the type that it is stored in,
+            and mu and p of the reduction (``eitskin.model.reduction``).
+        solver, iterations, gap, mac_limit: how the image is found: with at most ``iterations``, or
+            until the relative duality gap is below ``gap`` (0: never), or with at most
+            ``mac_limit`` multiply-accumulates (0: no limit).
+        lambda_rel: least lambda over lambda_max; a value below the lambda that the noise requires
+            has no effect.
+        warm_start: each frame starts from the last one's image. It is scored at the fourth frame of
+            touches that are held, after other touches: what a user sees of resting touches, not of
+            new ones.
+        touch_sweeps: sweeps of the off-grid fit; 0 leaves touches at the peaks of the image.
+        touch_fit: parts of the touch fit (``core.results``: log data 1, split and merge 2,
+            interaction 4).
+        model_errors: whether the model holds model errors, for row gains and the test of touches.
+            They cost time, and prevent false touches on skins unlike the model.
+        second_pass: the image is solved again with the interaction of touches removed from the
+            data. It cannot be set over a board's link.
+        samples: samples per measurement, at 1 MS/s; white noise falls with their square root.
+        scan: "full" measures every row; "reciprocal" measures one of each reciprocal pair, in half
+            the time with sqrt(2) of the noise.
     """
 
     name: str
@@ -70,12 +71,13 @@ class Configuration:
     model_errors: bool = True
 
     def as_dict(self) -> dict[str, Any]:
+        """Return the settings as JSON values."""
         return asdict(self)
 
     @property
     def model_settings(self) -> tuple[int, int, str, float, float, bool]:
-        """What a model is built by: pixels, rank, storage, regularisation, column power, and
-        whether it has errors."""
+        """The settings that a model is built with: pixels, rank, storage, regularisation, column
+        power, and whether it has model errors."""
         return (
             self.pixels,
             self.rank,
@@ -87,7 +89,7 @@ class Configuration:
 
     @property
     def solver_settings(self) -> dict[str, Any]:
-        """What the solver is told, by the names of ``core.results.Options``."""
+        """The settings of the solver, by the names of ``core.results.Options``."""
         settings = {
             "solver": self.solver,
             "iterations": self.iterations,
@@ -102,12 +104,16 @@ class Configuration:
 
     @property
     def held(self) -> int:
-        """How many frames touches are held before they are judged."""
+        """The number of frames that touches are held before they are scored."""
         return HELD_FRAMES if self.warm_start else 1
 
 
 def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
-    """A configuration from a TOML table or a results file; what is not there has its default."""
+    """Return the configuration in a TOML table or a results file; missing keys take their defaults.
+
+    Raises:
+        ConfigError: a key is unknown, wrong or out of range, or there is no name.
+    """
     name = table.get("name")
     if not isinstance(name, str) or not name.strip() or "," in name:
         raise ConfigError(
@@ -118,7 +124,7 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
     one: Configuration = from_table(Configuration, table, where)
     if one.samples % PERIOD_SAMPLES:
         raise ConfigError(
-            f"{where}: samples = {one.samples} is no whole number of the excitation's periods; use"
+            f"{where}: samples = {one.samples} is not a whole number of excitation periods; use"
             f" a multiple of {PERIOD_SAMPLES}"
         )
     return one
@@ -127,13 +133,13 @@ def configuration_from(table: Mapping[str, Any], where: str) -> Configuration:
 def build_settings(
     one: Configuration, skin: Skin, mask_threshold: float | None = None
 ) -> BuildSettings:
-    """How the model of a configuration is built; its solver's settings and t become the model's
-    defaults, as far as a model has them: not the gap, a limit of MACs, the warm start and the
-    sweeps."""
-    usual = scaled_defaults(skin, "difference")
+    """Return how the model of a configuration is built. The solver's settings and the mask
+    threshold become defaults of the model, except those that a model does not hold: gap, MAC limit,
+    warm start and sweeps."""
+    defaults = scaled_defaults(skin, "difference")
     left_out = ALL_TOUCH_FIT & ~one.touch_fit
     defaults = replace(
-        usual,
+        defaults,
         solver=one.solver,
         iterations=one.iterations,
         lambda_rel=one.lambda_rel,

@@ -1,5 +1,5 @@
-"""A budget or an accuracy where a model is given already: the solver's settings of a measured point
-that it can take."""
+"""Choose an operating point for a given model: measured settings of the solver that this model can
+use."""
 
 from typing import Any
 
@@ -7,25 +7,27 @@ from eitskin.core.results import Options
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
 from eitskin.tuning.configuration import Configuration
-from eitskin.tuning.front import Conditions, Point, Target, choose, load_front
+from eitskin.tuning.front import Conditions, OperatingPoint, Preset, choose, load_front
 
 
-def chosen_point(
-    target: Target,
+def operating_point_for(
+    preset: Preset,
     model: Model,
     now: Options,
     settable: set[str] | None = None,
     any_scan: bool = False,
-) -> Point:
-    """The measured point that fulfils ``target`` with ``model``: of its rank, grid, storage and
-    reduction, with no other settings than ``now`` but those in ``settable`` (None: any), and
-    scanned fully with 80 samples unless ``any_scan``.
+) -> OperatingPoint:
+    """Return the operating point that fulfils ``preset`` with ``model``.
+
+    It must have been measured with the same rank, grid, storage and reduction. Its settings may
+    differ from ``now`` only in ``settable`` (None: any), and it must use the full scan with 80
+    samples unless ``any_scan`` is set.
 
     Raises:
-        UsageError: there is none, or none that does what is asked for.
-        FileError, ConfigError: there are no results.
+        UsageError: no operating point of this model exists, or none fulfils the preset.
+        FileError, ConfigError: the results are missing or damaged.
     """
-    usual = Configuration("")
+    default = Configuration("")
     points = []
     for point in load_front().points:
         one = point.configuration
@@ -33,30 +35,30 @@ def chosen_point(
         other = {name for name, value in wanted if not _same(value, getattr(now, name, None))}
         if (
             _is_of(one, point, model)
-            and (any_scan or (one.samples, one.scan) == (usual.samples, usual.scan))
+            and (any_scan or (one.samples, one.scan) == (default.samples, default.scan))
             and one.warm_start == now.warm_start
             and (settable is None or other <= settable)
         ):
             points.append(point)
     if not points:
         raise UsageError(
-            "--preset, --budget and --accuracy: no measured point has this model's rank"
-            f" {model.rank}, {model.grid.n_pixels} pixels in"
-            f" {model.stored.storage}{' and starts warm' if now.warm_start else ''}; make a model"
-            " of one by  eitskin recommend -o MODEL.eitm"
+            f"preset: no operating point was measured with a model of rank {model.rank},"
+            f" {model.grid.n_pixels} pixels and {model.stored.storage} like this one"
+            f"{', started warm' if now.warm_start else ''}; make a model with measured settings by"
+            "  eitskin recommend -o MODEL.eitm"
         )
-    return choose(points, target, "measured point of this model")
+    return choose(points, preset, "operating point of this model")
 
 
 def _same(value: Any, other: Any) -> bool:
-    """Equal, a number to what a float32 keeps of it."""
+    """Return whether both are equal; numbers are compared to the precision of float32."""
     if isinstance(value, float) and isinstance(other, float):
         return abs(value - other) <= 1e-6 * abs(value)
     return bool(value == other)
 
 
-def _is_of(one: Configuration, point: Point, model: Model) -> bool:
-    """Whether a point was measured with such a model."""
+def _is_of(one: Configuration, point: OperatingPoint, model: Model) -> bool:
+    """Return whether the point was measured with such a model."""
     build = model.meta.get("build", {})
     if build.get("pixels_across", one.pixels) != one.pixels:
         return False
@@ -73,13 +75,13 @@ def _is_of(one: Configuration, point: Point, model: Model) -> bool:
     )
 
 
-def settings_text(point: Point, board: str) -> str:
-    """What was chosen, in a line."""
+def settings_text(point: OperatingPoint, board: str) -> str:
+    """Return a line that states what was chosen."""
     one = point.configuration
-    usual, score = Conditions(), point.accuracy(Conditions())
-    typical, most = (point.cost("us", board, usual, worst) for worst in (False, True))
+    where, score = Conditions(), point.accuracy(Conditions())
+    typical, most = (point.cost("us", board, where, worst) for worst in (False, True))
     text = (
-        f"settings of {point.name!r}: {one.solver}, {one.iterations} iterations at most, lambda_rel"
+        f"settings of {point.name!r}: {one.solver}, at most {one.iterations} iterations, lambda_rel"
         f" {one.lambda_rel:g}"
     )
     text += f", gap {one.gap:g}" if one.gap else ""
@@ -89,6 +91,6 @@ def settings_text(point: Point, board: str) -> str:
     if score is not None:
         text += f"; measured: image MIoU {score:.3f}"
     if typical is not None and most is not None:
-        where = "on the F767 (an estimate)" if board == "f767" else "on the host that measured"
-        text += f", {typical / 1000:.3g} ms a frame, at most {most / 1000:.3g}, {where}"
+        machine = "on the F767 (an estimate)" if board == "f767" else "on the host that measured"
+        text += f", {typical / 1000:.3g} ms per frame, at most {most / 1000:.3g}, {machine}"
     return text

@@ -1,4 +1,4 @@
-"""Measured points, and which of them to choose for a budget or an accuracy."""
+"""Measured operating points, and the choice of one by a preset, a limit or an accuracy."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from eitskin.tuning.report_time import report_us
 FORMAT, VERSION = "eitskin-tradeoff", 1
 SHIPPED = "front.json"
 F767_MHZ = 216
-F767_RAM = 256 * 1024  # the linker script promises the workspace as much
-DEFAULT_PERIOD_US = 20_800  # of the default scan
+F767_RAM = 256 * 1024  # the linker script reserves this much for the workspace
+DEFAULT_PERIOD_US = 20_800  # duration of the default scan
 REPORT_US = "report_us"
-MIN_SWEEPS = Configuration.touch_sweeps  # fewer save little, and at the cost of the discs
+MIN_SWEEPS = Configuration.touch_sweeps  # fewer sweeps save little, and make discs worse
 MEASURED = ("threshold", "force_scale", "costs", "instructions", "host_us")
 SHORT_CELL = (
     "image.mean", "image.low", "image.high", "image.worst_tenth", "discs.mean", "exact_count",
     "solve_macs", "touch_macs", "most_macs",
 )  # fmt: skip
-MODEL_HOLDS = {"solver", "iterations", "lambda_rel", "touch_fit"}  # of the solver's settings
+MODEL_HOLDS = {"solver", "iterations", "lambda_rel", "touch_fit"}  # stored in a model
 
 
 @dataclass(frozen=True)
-class Budget:
-    """A bound of a frame's solve and touches, ``unit`` "us", "MACs" or "instructions", or of the
-    time from contact to report, "report_us"."""
+class Limit:
+    """A limit on the cost of a frame's solve and touches, with ``unit`` "us", "MACs" or
+    "instructions", or on the time from contact to report, "report_us"."""
 
     value: float
     unit: str
@@ -56,8 +56,12 @@ UNITS = {
 }  # fmt: skip
 
 
-def read_budget(text: str) -> Budget:
-    """A budget from "10ms", "800us", "600kMACs" or "2.5Minstructions"."""
+def read_limit(text: str) -> Limit:
+    """Return the limit in a text such as "10ms", "800us", "600kMACs" or "2.5Minstructions".
+
+    Raises:
+        UsageError: the text is not a limit.
+    """
     match = re.fullmatch(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?)\s*([A-Za-z]+)", text.strip())
     unit = None if match is None else match.group(2).lower()
     unit = unit if unit in UNITS or unit is None else f"{unit}s"
@@ -67,20 +71,21 @@ def read_budget(text: str) -> Budget:
             " 2.5Minstructions"
         )
     factor, kind = UNITS[unit]
-    return Budget(float(match.group(1)) * factor, kind)
+    return Limit(float(match.group(1)) * factor, kind)
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
-    """A configuration as measured.
+class OperatingPoint:
+    """A configuration with what was measured for it.
 
     Attributes:
-        threshold, force_scale: what was trained.
+        threshold, force_scale: the trained values.
         costs: ``flash_bytes``, ``ram_bytes``, ``pixels_kept``, ``acquisition_us``.
-        instructions: of solve and touches on the Cortex-M7: ``kind`` ("counted" or "estimated"),
-            ``mean``, ``most``...; or None.
-        host_us: ``p50``, ``p99`` and ``most`` (``host_times``) of solve and touches; or None.
-        scores: by set, then by SNR in dB as text.
+        instructions: those of solve and touches on the Cortex-M7: ``kind`` ("counted" or
+            "estimated"), ``mean``, ``most`` and more; or None.
+        host_us: ``p50``, ``p99`` and ``most`` of solve and touches on the host (``host_times``); or
+            None.
+        scores: the scores by set, then by SNR in dB as text.
     """
 
     configuration: Configuration
@@ -93,30 +98,33 @@ class Point:
 
     @property
     def name(self) -> str:
-        """The configuration's."""
+        """The name of the configuration."""
         return self.configuration.name
 
     def score(self, where: Conditions) -> dict[str, Any] | None:
-        """The scores on a set at an SNR; None where that was not measured."""
+        """Return the scores on a set at an SNR, or None if they were not measured."""
         return self.scores.get(where.scenes, {}).get(f"{where.snr_db:g}")
 
     def accuracy(self, where: Conditions) -> float | None:
-        """Mean MIoU there."""
+        """Return the mean MIoU under these conditions, or None."""
         score = self.score(where)
         return None if score is None else float(score[where.judged]["mean"])
 
     def macs(self, where: Conditions) -> tuple[float, float] | None:
-        """Mean and most MACs of solve and touches there."""
+        """Return the mean and the greatest number of MACs of solve and touches under these
+        conditions, or None."""
         score = self.score(where)
         if score is None:
             return None
         return score["solve_macs"][0] + score["touch_macs"][0], score["most_macs"]
 
     def cost(self, unit: str, board: str, where: Conditions, worst: bool = False) -> float | None:
-        """Solve and touches of a frame in ``unit``: the mean (host: the median), or of the
-        costliest frame that was counted or timed; None if unknown. ``report_us``: from contact to
-        report (tuning.report_time). Times of the F767 are estimates:
-        an instruction a cycle."""
+        """Return the cost of solve and touches of a frame in ``unit``, or None if unknown.
+
+        It is the mean (host: the median), or with ``worst`` that of the most expensive frame that
+        was counted or timed. ``report_us`` is the time from contact to report (tuning.report_time).
+        Times of the F767 are estimates with one instruction per cycle.
+        """
         if unit == REPORT_US:
             solve_us = self.cost("us", board, where, worst)
             scan_us = float(self.costs["acquisition_us"])
@@ -134,27 +142,28 @@ class Point:
 
     @property
     def fits_f767(self) -> bool:
-        """Whether flash and RAM of the NUCLEO-F767ZI hold model and workspace, and model and SOLVER
-        command the settings."""
+        """Return whether model and workspace fit into flash and RAM of the NUCLEO-F767ZI, and all
+        settings can be stored in the model or sent by the SOLVER command."""
         fits = self.costs["flash_bytes"] <= BANK_BYTES - RECORD_BYTES
         fits = bool(fits and self.costs["ram_bytes"] <= F767_RAM)
         return fits and not unusual(self.configuration) - MODEL_HOLDS - board_takes()
 
 
 def unusual(one: Configuration) -> set[str]:
-    """The names of the solver's settings in which ``one`` differs from the defaults."""
-    usual = Configuration("").solver_settings
-    return {name for name, value in one.solver_settings.items() if value != usual.get(name)}
+    """Return the names of the solver's settings in which ``one`` differs from the defaults."""
+    defaults = Configuration("").solver_settings
+    return {name for name, value in one.solver_settings.items() if value != defaults.get(name)}
 
 
 def board_takes() -> set[str]:
-    """The names of the solver's settings that a board can be told."""
+    """Return the names of the solver's settings that can be sent to a board."""
     return {one.name for one in fields(SolverSettings)}
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """What accuracy means: which scenes, at which SNR, and whether images or discs are judged."""
+    """The conditions of an accuracy: the scenes, the SNR, and whether images or discs are
+    scored."""
 
     scenes: str = "random"
     snr_db: float = 60.0
@@ -166,16 +175,16 @@ class Conditions:
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """A file of results: what was measured under which ``settings``."""
+    """A file of results: the operating points that were measured with ``settings``."""
 
     settings: dict[str, Any]
-    points: tuple[Point, ...]
+    points: tuple[OperatingPoint, ...]
     where_from: str = "the shipped results"
 
 
 def _cell(cell: Any) -> dict[str, Any]:
-    """The scores of a set at an SNR: as they are, or from the numbers of the shipped results, which
-    are in the order of ``SHORT_CELL``."""
+    """Return the scores of a set at an SNR, either as they are, or from the numbers of the shipped
+    results, which are in the order of ``SHORT_CELL``."""
     if isinstance(cell, dict):
         return cell
     scores: dict[str, Any] = {}
@@ -189,7 +198,7 @@ def _cell(cell: Any) -> dict[str, Any]:
 
 
 def front_from(values: Any, where: str) -> Front:
-    """Results from JSON values."""
+    """Return the results in JSON values; ``where`` names them in errors."""
     try:
         if values["format"] != FORMAT or values["version"] != VERSION:
             raise KeyError("format")
@@ -201,16 +210,21 @@ def front_from(values: Any, where: str) -> Front:
                 for name, cells in one["scores"].items()
             }
             configuration = configuration_from(one["configuration"], where)
-            points.append(Point(configuration, **parts, scores=scores))
+            points.append(OperatingPoint(configuration, **parts, scores=scores))
         return Front(dict(values["settings"]), tuple(points), where)
     except (KeyError, TypeError, ValueError, AttributeError):
         raise ConfigError(
-            f"{where}: no results of  eitskin tradeoff run  of version {VERSION}; run it again"
+            f"{where}: not results of  eitskin tradeoff run  of version {VERSION}; run it again"
         ) from None
 
 
 def load_front(path: Path | None = None) -> Front:
-    """The results in ``path``, or those that ship with the package."""
+    """Return the results in the file ``path``, or those that ship with the package.
+
+    Raises:
+        FileError: the file cannot be read.
+        ConfigError: it does not hold results.
+    """
     if path is not None:
         try:
             return front_from(parse_json(read_bytes(path, "results file")), str(path))
@@ -229,12 +243,17 @@ def load_front(path: Path | None = None) -> Front:
 
 
 @dataclass(frozen=True)
-class Target:
-    """What is asked for: at most ``budget``, for the mean frame or the ``worst``, at least
-    ``accuracy``, on ``board``; a frame measured within ``period_us``. ``compared_in``:
-    in which unit cost is compared where there is no budget; ``name``: of a preset."""
+class Preset:
+    """The requirements by which an operating point is chosen: a named preset, or limits given to
+    ``eitskin recommend``.
 
-    budget: Budget | None
+    The cost is at most ``limit``, for the mean frame or the ``worst``, and the accuracy is at least
+    ``accuracy``, on ``board`` under the conditions ``where``; a frame is measured within
+    ``period_us``. Without a limit, costs are compared in the unit ``compared_in``. ``name`` is
+    empty unless it is a named preset.
+    """
+
+    limit: Limit | None
     accuracy: float | None
     board: str
     where: Conditions
@@ -245,91 +264,104 @@ class Target:
 
     @property
     def unit(self) -> str:
-        """In which cost is compared."""
-        return self.compared_in if self.budget is None else self.budget.unit
+        """The unit in which costs are compared."""
+        return self.compared_in if self.limit is None else self.limit.unit
 
     @property
     def acquisition_us(self) -> float:
-        """How long measuring may take: the period, or without one the longer of the budget and the
-        default scan; any time where reports are compared, which it is part of."""
+        """The longest time that measuring a frame may take: the period if it is given, otherwise
+        the longer of the limit and the default scan. If reports are compared, any time is allowed,
+        as it is part of them."""
         if self.period_us is not None or self.unit == REPORT_US:
             return self.period_us or math.inf
-        longest = self.budget.value if self.budget is not None and self.budget.unit == "us" else 0.0
+        longest = self.limit.value if self.limit is not None and self.limit.unit == "us" else 0.0
         return max(longest, DEFAULT_PERIOD_US)
 
 
-# What a preset asks for: the soonest report with the paper's .84; the most accurate whose report
-# comes within so many ms of contact; the most accurate of all.
+# "fast" has the earliest report with the paper's accuracy of .84, "balanced" is the most accurate
+# with a report within 45 ms of contact, and "accurate" is the most accurate of all.
 PRESET_ACCURACY = {"fast": 0.84}
 PRESET_REPORT_MS = {"balanced": 45.0, "accurate": 1e6}
 PRESETS = (*PRESET_ACCURACY, *PRESET_REPORT_MS)
 
 
-def preset(name: str, board: str, where: Conditions | None = None) -> Target:
-    """What the preset ``name`` asks for on ``board``."""
+def named_preset(name: str, board: str, where: Conditions | None = None) -> Preset:
+    """Return the preset ``name`` for ``board``.
+
+    Raises:
+        UsageError: there is no such preset.
+    """
     if name not in PRESETS:
         raise UsageError(f"preset {name}: {nearest(name, PRESETS)}")
     ms = PRESET_REPORT_MS.get(name)
-    budget = None if ms is None else Budget(1000 * ms, REPORT_US)
+    limit = None if ms is None else Limit(1000 * ms, REPORT_US)
     accuracy = PRESET_ACCURACY.get(name)
     place = where or Conditions()
-    return Target(budget, accuracy, board, place, compared_in=REPORT_US, name=name)
+    return Preset(limit, accuracy, board, place, compared_in=REPORT_US, name=name)
 
 
-def check_wish(target: Target) -> Target:
-    """``target`` if it can be."""
-    if target.budget is None and target.accuracy is None:
+def checked_preset(preset: Preset) -> Preset:
+    """Return ``preset``, or raise a UsageError if its limits are not valid."""
+    if preset.limit is None and preset.accuracy is None:
         raise UsageError(
-            "name what to choose by:  --preset balanced,  --budget 10ms  or  --accuracy 0.86"
+            "state what to choose by:  --preset balanced,  --budget 10ms  or  --accuracy 0.86"
         )
-    if target.accuracy is not None and not 0 < target.accuracy < 1:
-        raise UsageError(f"--accuracy {target.accuracy:g} is an MIoU; use above 0 to below 1")
-    if target.period_us is not None and not target.period_us > 0:
+    if preset.accuracy is not None and not 0 < preset.accuracy < 1:
+        raise UsageError(f"--accuracy {preset.accuracy:g} is an MIoU; use above 0 to below 1")
+    if preset.period_us is not None and not preset.period_us > 0:
         raise UsageError("--period must be above 0")
-    if target.board == "host" and target.unit == "instructions":
+    if preset.board == "host" and preset.unit == "instructions":
         raise UsageError(
             "instructions are counted on the Cortex-M7; use a time or MACs for the host, or "
             " --board f767"
         )
-    return target
+    return preset
 
 
-def choose(points: Iterable[Point], target: Target, what: str = "measured point") -> Point:
-    """With a budget the most accurate point within it; with an accuracy the cheapest that reaches
-    it; with both the cheapest that does both. Points that save on the fit of touches are left out.
-    ``what`` names the points in the refusal."""
+def choose(
+    points: Iterable[OperatingPoint], preset: Preset, what: str = "operating point"
+) -> OperatingPoint:
+    """Return the most accurate point within the limit if there is a limit, the cheapest point that
+    reaches the accuracy if there is an accuracy, and the cheapest that does both if there are both.
+
+    Points with fewer sweeps of the touch fit than the default are left out. ``what`` names the
+    points in errors.
+
+    Raises:
+        UsageError: no point fulfils the preset.
+    """
     known = []
     for one in points:
-        cost = one.cost(target.unit, target.board, target.where, target.worst)
-        accuracy = one.accuracy(target.where)
-        fits = target.board == "host" or one.fits_f767
+        cost = one.cost(preset.unit, preset.board, preset.where, preset.worst)
+        accuracy = one.accuracy(preset.where)
+        fits = preset.board == "host" or one.fits_f767
         usable = fits and one.configuration.touch_sweeps >= MIN_SWEEPS
         if cost is not None and accuracy is not None and usable:
             known.append((cost, accuracy, one))
     if not known:
         raise UsageError(
-            f"no {what} has {target.where} and a cost in {target.unit} on the {target.board}; run "
+            f"no {what} has {preset.where} and a cost in {preset.unit} on the {preset.board}; run "
             " eitskin tradeoff run"
         )
-    known = [row for row in known if row[2].costs["acquisition_us"] <= target.acquisition_us]
+    known = [row for row in known if row[2].costs["acquisition_us"] <= preset.acquisition_us]
     if not known:
         raise UsageError(
-            f"no {what} measures a frame within {target.acquisition_us / 1000:g} ms; allow more"
+            f"no {what} measures a frame within {preset.acquisition_us / 1000:g} ms; allow more"
             " with  --period"
         )
-    within = [row for row in known if target.budget is None or row[0] <= target.budget.value]
+    within = [row for row in known if preset.limit is None or row[0] <= preset.limit.value]
     if not within:
         least = min(known, key=lambda row: row[0])
-        takes = Budget(least[0], target.unit)
+        takes = Limit(least[0], preset.unit)
         raise UsageError(
-            f"no {what} keeps to {target.budget}; the cheapest, {least[2].name!r}, takes {takes}"
+            f"no {what} keeps to {preset.limit}; the cheapest, {least[2].name!r}, takes {takes}"
         )
-    if target.accuracy is None:
+    if preset.accuracy is None:
         return min(within, key=lambda row: (-row[1], row[0]))[2]
-    reached = [row for row in within if row[1] >= target.accuracy]
+    reached = [row for row in within if row[1] >= preset.accuracy]
     if not reached:
         best = max(within, key=lambda row: row[1])
-        bound = "" if target.budget is None else f" within {target.budget}"
-        found = f"the best, {best[2].name!r}, has {best[1]:.3f} ({target.where})"
-        raise UsageError(f"no {what} reaches {target.accuracy:g}{bound}; {found}")
+        bound = "" if preset.limit is None else f" within {preset.limit}"
+        found = f"the best, {best[2].name!r}, has {best[1]:.3f} ({preset.where})"
+        raise UsageError(f"no {what} reaches {preset.accuracy:g}{bound}; {found}")
     return min(reached, key=lambda row: (row[0], -row[1]))[2]

@@ -1,10 +1,11 @@
-"""From contact to report: what a user waits for a touch, on a board or with its rows on a host.
+"""The time from contact to report: how long a user waits for a touch, with the solver on a board or
+on a host.
 
     report = period / 2 + scan + solve and touches + link
 
-A touch that lands while a scan runs is in whole in the next frame only, which begins half a period
-later on average; the period from frame to frame is the longer of scan and solve. The board sends
-touches; a host is sent rows.
+A touch that lands during a scan is complete only in the next frame, which begins half a period
+later on average. The period from frame to frame is the longer of scan and solve. The board sends
+touches; to a host it sends rows.
 """
 
 from eitskin.device.bandwidth import (
@@ -17,13 +18,13 @@ from eitskin.device.bandwidth import (
 )
 from eitskin.device.ports import BAUD
 
-ROWS = 208  # of a RAW of 16 electrodes, whichever of them a scan measures
+ROWS = 208  # rows in a RAW packet of 16 electrodes, even if a scan measures fewer
 TWO_TOUCHES = TOUCHES_BYTES // 4
 
 
 def report_us(scan_us: float, solve_us: float, board: str) -> float:
-    """The mean time where a scan takes ``scan_us``, solve and touches ``solve_us``, both on
-    average. ``board``: "f767", or "host"."""
+    """Return the mean time if a scan takes ``scan_us``, and solve and touches take ``solve_us``,
+    both on average. ``board`` is "f767" or "host"."""
     size = RAW_BYTES + ROW_BYTES * ROWS if board == "host" else SOLVED_BYTES + TWO_TOUCHES
     link_us = 1e6 * (size + PACKET_BYTES) * BITS_A_BYTE / BAUD
     return max(scan_us, solve_us) / 2 + scan_us + solve_us + link_us

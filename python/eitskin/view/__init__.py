@@ -1,1 +1,1 @@
-"""Pictures."""
+"""Draw pictures and films of skins, images and touches."""

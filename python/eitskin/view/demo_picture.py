@@ -1,4 +1,4 @@
-"""The demo as a picture."""
+"""Draw the result of the demo."""
 
 from pathlib import Path
 

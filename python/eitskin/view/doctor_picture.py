@@ -1,5 +1,5 @@
-"""The doctor's picture: reference against expectation, gains by pair, reciprocity, noise. Needs
-matplotlib."""
+"""Draw the doctor's findings: reference and expectation, gains by pair, reciprocity, and noise.
+Needs matplotlib."""
 
 from pathlib import Path
 from typing import Any
@@ -42,13 +42,13 @@ def draw_report(path: str | Path, report: DoctorReport, case: Case) -> None:
 
 def _reference(panel: Any, case: Case) -> None:
     expected_mv, measured_mv = 1e3 * case.expected(), 1e3 * case.reference
-    label = "expected of a homogeneous skin"
+    label = "expected for a homogeneous skin"
     panel.plot(expected_mv, color=EXPECTED, linewidth=2.5, label=label)
     panel.plot(measured_mv, color=MEASURED, linewidth=0.9, label="measured")
     off = np.flatnonzero(~case.trusted)
     if len(off):
         panel.plot(off, measured_mv[off], ".", color=BAD, markersize=6, label="not trusted")
-    panel.set(xlabel="channel (order and sign repaired)", ylabel="mV", title="Mean quiet frame")
+    panel.set(xlabel="row (order and sign repaired)", ylabel="mV", title="Mean untouched frame")
     low, high = panel.get_ylim()
     panel.set_ylim(low, high + 0.2 * (high - low))
     panel.legend(frameon=False, fontsize=8, loc="upper right", ncols=2)
@@ -71,7 +71,7 @@ def _gains(figure: Any, panel: Any, case: Case) -> None:
         texts = [f"{a},{b}" for a, b in named[::step]]
         set_ticks(range(0, len(named), step), texts, fontsize=8)
     panel.set(xlabel="measuring pair", ylabel="drive pair")
-    panel.set_title("Gain of each channel (grey: not trusted)")
+    panel.set_title("Gain of each row (grey: not trusted)")
     figure.colorbar(shown, ax=panel, label="% from expected")
 
 
@@ -79,10 +79,10 @@ def _reciprocity(panel: Any, case: Case) -> None:
     pairs = case.frames.protocol.reciprocal_pairs()
     both = pairs.second >= 0
     first, second, sign = pairs.first[both], pairs.second[both], pairs.sign[both]
-    panel.set(xlabel="voltage of a channel, mV", ylabel="mV")
+    panel.set(xlabel="voltage of a row, mV", ylabel="mV")
     panel.set_title("Reciprocity: difference within each pair")
     if not len(first):
-        panel.text(0.5, 0.5, "no reciprocal channels", transform=panel.transAxes, ha="center")
+        panel.text(0.5, 0.5, "no reciprocal rows", transform=panel.transAxes, ha="center")
         return
     reference = 1e3 * case.reference
     difference = reference[first] - sign * reference[second]
@@ -99,9 +99,9 @@ def _noise_or_change(panel: Any, case: Case) -> None:
         panel.semilogy(np.maximum(noise, 1e-6), ".", color=MEASURED, markersize=4)
         median = float(np.median(noise[case.trusted])) if case.trusted.any() else 0.0
         panel.axhline(median, color=EXPECTED)
-        panel.set(xlabel="channel", ylabel="µV")
-        panel.set_title(f"Noise over {len(quiet)} quiet frames (line: median)")
+        panel.set(xlabel="row", ylabel="µV")
+        panel.set_title(f"Noise of {len(quiet)} untouched frames (line: median)")
         return
-    panel.set(xlabel="channel", ylabel="mV", title="Change of each frame from the quiet one")
+    panel.set(xlabel="row", ylabel="mV", title="Change of each frame from the reference")
     for frame in case.frames.voltage_v[:20]:
         panel.plot(1e3 * (frame - case.reference), linewidth=0.7)

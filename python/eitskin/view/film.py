@@ -1,5 +1,5 @@
-"""A short film of frames: the skin with its image and touches, one scale of colours throughout, in
-the frames' own time."""
+"""Make a short film of frames: the skin with its image and touches, with the same colour scale for
+all frames, at the speed of the frames' own times."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,14 +18,19 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 FORMATS = (".webp", ".gif")
-MAX_FRAMES = 240  # of a film, which is kept in memory until it is written
-MIN_MS, MAX_MS = 40, 2000  # that a frame is seen
+MAX_FRAMES = 240  # limits the memory, as a film is held there until it is written
+MIN_MS, MAX_MS = 40, 2000  # how long a frame is shown
 DPI = 140
 COLOURS = 256
 
 
 def check_film(path: str | Path | None) -> None:
-    """Refuse a film that cannot be made, before anything is done for it."""
+    """Raise an error if the film cannot be made, before any work is done for it.
+
+    Raises:
+        UsageError: the suffix is not that of a film.
+        MissingExtraError: pillow is not installed.
+    """
     if path is None:
         return
     check_path(path, FORMATS, "film")
@@ -33,7 +38,11 @@ def check_film(path: str | Path | None) -> None:
 
 
 def load_pillow() -> Any:
-    """pillow's images."""
+    """Return the module ``PIL.Image``.
+
+    Raises:
+        MissingExtraError: pillow is not installed.
+    """
     try:
         import PIL.Image
     except ImportError:
@@ -49,8 +58,11 @@ def draw_film(
     *,
     progress: Progress = silent,
 ) -> None:
-    """``panels``, at ``times_s`` that ascend, as an animated WebP or GIF; of more than 240 evenly
-    spaced ones. A frame is seen 40 ms to 2 s."""
+    """Write ``panels`` as an animated WebP or GIF, as the suffix says.
+
+    ``times_s`` are the ascending times of the panels. Each is shown until the next one's time, but
+    for 40 ms to 2 s. Of more than 240 panels, 240 evenly spaced ones are shown.
+    """
     check_film(path)
     chosen = thinned(len(panels))
     limit = max((largest(p.values) for p in panels if p.values is not None), default=1.0)
@@ -69,13 +81,14 @@ def draw_film(
 
 
 def thinned(count: int) -> list[int]:
-    """At most MAX_FRAMES of ``count`` frames, evenly spaced, the first and the last among them."""
+    """Return the numbers of at most MAX_FRAMES of ``count`` frames, evenly spaced, including the
+    first and the last."""
     most = min(count, MAX_FRAMES)
     return [int(k) for k in np.unique(np.linspace(0, count - 1, most).round())]
 
 
 def _image(model: Model, panel: Panel, limit: float) -> "Image":
-    """One frame; 256 colours, which take a third of the memory."""
+    """Return a frame with 256 colours, which need a third of the memory."""
     figure = panels_figure(model.skin, model.grid, [panel], limit=limit, large=False)
     figure.set_dpi(DPI)
     canvas: Any = figure.canvas

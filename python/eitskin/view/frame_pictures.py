@@ -1,4 +1,4 @@
-"""Pictures of reconstructed frames, with the truth that they carry."""
+"""Draw reconstructed frames with the truth that they hold."""
 
 from pathlib import Path
 
@@ -15,7 +15,8 @@ MAX_PANELS = 36
 
 
 def true_marks(frames: Frames, number: int) -> tuple[Mark, ...]:
-    """The true touches of frame ``number``; their change is drawn by sign."""
+    """Return marks for the true touches of frame ``number``. A mark's change is only the touch's
+    sign."""
     if frames.touch_xy_mm is None or frames.touch_radius_mm is None:
         return ()
     own, signs = frames.touches_in(number), frames.touch_sign
@@ -27,7 +28,7 @@ def true_marks(frames: Frames, number: int) -> tuple[Mark, ...]:
 
 
 def found_marks(result: Reconstruction) -> tuple[Mark, ...]:
-    """What was found."""
+    """Return marks for the found touches."""
     return tuple(map(found_mark, result.touches))
 
 
@@ -42,8 +43,8 @@ def draw_results(
     results: dict[int, Reconstruction],
     scores: dict[int, FrameScore],
 ) -> None:
-    """A panel a frame, the first 36: image, true touches as circles, found ones as crosses and
-    dashed circles."""
+    """Draw a panel for each of the first 36 frames: the image, circles for true touches, and
+    crosses with dashed circles for found ones."""
     panels = []
     for number, result in list(results.items())[:MAX_PANELS]:
         heading = frames.frame_name[number]
@@ -64,8 +65,8 @@ def film_results(
     *,
     progress: Progress = silent,
 ) -> None:
-    """Image, true and found touches frame by frame, in the frames' time, or ten a second where they
-    have none."""
+    """Write a film of images with true and found touches, at the frames' own times, or at ten
+    frames per second if they have no times."""
     kept = [list(results)[k] for k in thinned(len(results))]
     panels = [_panel(frames.frame_name[k], frames, k, results[k]) for k in kept]
     times = frames.time_s

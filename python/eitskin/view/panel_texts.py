@@ -1,4 +1,4 @@
-"""Texts of pictures: wrapped to a width in inches, and what marks mean."""
+"""Wrap texts of pictures to a width in inches, and draw the key of their marks."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def wrapped(text: str, width: float, size: float, weight: str = "normal") -> list[str]:
-    """``text`` in lines of at most ``width`` inches at ``size`` points; words that are longer are
+    """Split ``text`` into lines of at most ``width`` inches at ``size`` points; longer words are
     cut."""
     lines: list[str] = []
     for part in text.split("\n"):
@@ -51,14 +51,14 @@ def _inches(text: str, size: float, weight: str) -> float:
 
 
 def plain(text: str) -> str:
-    """``text`` that matplotlib does not take for a formula."""
+    """Return ``text`` escaped so that matplotlib does not read it as a formula."""
     return text.replace("$", r"\$")
 
 
 class Key:
-    """What the marks of ``panels`` mean, in as many rows as ``width`` inches need."""
+    """The key of the marks in ``panels``, in as many lines as ``width`` inches need."""
 
-    SAMPLE = 0.62  # inches of a mark and the room around it
+    SAMPLE = 0.62  # width of a mark and the space around it, in inches
 
     def __init__(self, panels: Sequence[Panel], width: float) -> None:
         from matplotlib.lines import Line2D
@@ -85,7 +85,8 @@ class Key:
         self.height = 0.08 + 0.19 * rows if self.handles else 0.0
 
     def draw(self, figure: "Figure", top: float, middle: float = 0.5) -> None:
-        """With its upper edge at ``top`` of the figure's height, from above, around ``middle``."""
+        """Draw the key centred at ``middle``, a fraction of the figure's width, with its upper edge
+        at ``top``, a fraction of the height measured from above."""
         if self.handles:
             figure.legend(
                 handles=self.handles, loc="upper center", bbox_to_anchor=(middle, 1 - top),

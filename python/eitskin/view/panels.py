@@ -1,5 +1,5 @@
-"""Figures of panels, laid out in inches so that every title, label and legend is whole, whatever
-the outline: panels have its shape, texts are wrapped to the width that there is."""
+"""Lay out figures of panels in inches so that every title, label and legend fits, whatever the
+outline: panels have its shape, and texts are wrapped to the width of the page."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ if TYPE_CHECKING:
 
 DPI = 150
 FORMATS = (".png", ".svg", ".pdf")
-ASPECT = 1.5  # of a picture, where the number of columns is free
-EMPTY_COST = 1.5  # of empty places, against an aspect that is off
+ASPECT = 1.5  # aimed at if the number of columns is free
+EMPTY_COST = 1.5  # weight of empty places, relative to a deviation from ASPECT
 MIN_WIDTH = 4.2  # inches, as all below
 EDGE, GAP = 0.12, 0.14
 BAR, TICKS, LINE = 0.12, 0.24, 0.165
 AXIS_LEFT, AXIS_BELOW = 0.62, 0.5
-SMALL_SIDE, BIG_SIDE = 1.65, 3.5  # of a square panel
-MAX_SMALL, MAX_BIG = 3.4, 6.4  # of a long one
+SMALL_SIDE, BIG_SIDE = 1.65, 3.5  # side of a square panel
+MAX_SMALL, MAX_BIG = 3.4, 6.4  # longer side of a long panel
 MAX_HEADING = 4  # lines
 UNIT_TEXT = "change of conductivity / its largest size in the panel"
 
 
 @dataclass(frozen=True)
 class Cell:
-    """The size of one panel, and what stands around it."""
+    """The size of a panel and the space to its left and below it, in inches."""
 
     width: float
     height: float
@@ -59,20 +59,21 @@ class Cell:
 
     @property
     def whole(self) -> float:
-        """The width with what stands beside the panel."""
+        """The width of the panel with the space beside it."""
         return self.left + self.width + GAP
 
 
 @dataclass
 class FigurePage:
-    """A figure under way: ``height`` grows from its top as things are put in."""
+    """A figure that is being laid out from top to bottom; ``height`` is how far it reaches so
+    far."""
 
     width: float
     height: float = EDGE
     texts: list[tuple[float, str, float, str]] = field(default_factory=list)
 
     def text(self, lines: Sequence[str], size: float, weight: str = "normal") -> None:
-        """Centred lines."""
+        """Add centred lines."""
         for line in lines:
             self.texts.append((self.height + LINE / 2, line, size, weight))
             self.height += LINE * size / 8.5
@@ -81,29 +82,37 @@ class FigurePage:
 def check_path(
     path: str | Path | None, formats: Sequence[str] = FORMATS, what: str = "picture"
 ) -> None:
-    """Refuse a picture's name that says no format, before anything is done for it."""
+    """Raise a UsageError if the name's suffix is not one of ``formats``, before any work is done.
+    ``what`` names the kind of picture in the error."""
     if path is not None and Path(path).suffix.lower() not in formats:
         suffix = Path(path).suffix
-        said = f"{suffix!r} is no format of a {what}" if suffix else f"a {what} needs a suffix"
-        raise UsageError(f"{path}: {said}; use {', '.join(formats)}")
+        problem = (
+            f"{suffix!r} is not a format of a {what}" if suffix else f"a {what} needs a suffix"
+        )
+        raise UsageError(f"{path}: {problem}; use {', '.join(formats)}")
 
 
 def check_picture(path: str | Path | None) -> None:
-    """Refuse a picture that cannot be drawn, before anything is done for it."""
+    """Raise an error if the picture cannot be drawn, before any work is done for it.
+
+    Raises:
+        UsageError: the suffix is not that of a picture.
+        MissingExtraError: matplotlib is not installed.
+    """
     if path is not None:
         check_path(path)
         load_matplotlib()
 
 
 def save_picture(figure: Figure, path: str | Path) -> None:
-    """Write a PNG, SVG or PDF, as the suffix says, whole or not at all, without dates and versions
-    that would make two runs differ."""
+    """Write the figure as PNG, SVG or PDF, as the suffix says, completely or not at all. Dates and
+    versions, by which two runs would differ, are left out."""
     check_path(path)
     kind = Path(path).suffix[1:].lower()
-    nothing = {"png": ("Software",), "svg": ("Date",), "pdf": ("CreationDate", "Producer")}[kind]
+    omitted = {"png": ("Software",), "svg": ("Date",), "pdf": ("CreationDate", "Producer")}[kind]
     matplotlib = load_matplotlib()
     with matplotlib.rc_context({"svg.hashsalt": "eitskin"}), write_beside(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=DPI, metadata=dict.fromkeys(nothing))
+        figure.savefig(temporary, format=kind, dpi=DPI, metadata=dict.fromkeys(omitted))
 
 
 def draw_panels(
@@ -117,7 +126,7 @@ def draw_panels(
     note: str = "",
     legend: bool = False,
 ) -> None:
-    """``panels_figure`` as a picture."""
+    """Write ``panels_figure`` as a picture."""
     figure = panels_figure(skin, grid, panels, columns, title=title, note=note, legend=legend)
     save_picture(figure, path)
 
@@ -133,7 +142,7 @@ def draw_frame(
     title: str = "",
     unit: str = "S/m",
 ) -> None:
-    """``frame_figure`` as a picture."""
+    """Write ``frame_figure`` as a picture."""
     image = np.asarray(values, dtype=np.float64)
     figure = frame_figure(skin, grid, image, truth=truth, found=found, title=title, unit=unit)
     save_picture(figure, path)
@@ -151,9 +160,13 @@ def panels_figure(
     limit: float | None = None,
     large: bool | None = None,
 ) -> Figure:
-    """Panels row by row, each coloured by its own largest change, or from -``limit`` to ``limit``
-    S/m; one or two (or as ``large`` says) are large and have axes in mm. ``columns``: None as fits
-    best; ``legend`` says what marks mean; ``note`` stands below."""
+    """Return a figure of panels, row by row.
+
+    Each panel is coloured by its own largest change, or all from -``limit`` to ``limit`` S/m. One
+    or two panels, or all if ``large`` is set, are large and have axes in mm. ``columns`` is None
+    for the number that fits best. ``legend`` adds a key of the marks, and ``note`` is written
+    below.
+    """
     small = len(panels) > 2 if large is None else not large
     cell = _cell(skin, small)
     size = 8.0 if small else 10.0
@@ -212,8 +225,11 @@ def frame_figure(
     title: str = "",
     unit: str = "S/m",
 ) -> Figure:
-    """One frame at large: truth (where given), image, touches, beside each other or, of a long
-    skin, below each other, with axes in mm and a colour bar in ``unit`` each."""
+    """Return a large figure of one frame: the truth if it is given, the image, and the touches.
+
+    The panels are side by side, or one below the other for a long skin. They have axes in mm, and
+    coloured ones a colour bar in ``unit``.
+    """
     panels = [Panel("image", image), Panel("touches", None, tuple(truth), tuple(found))]
     if truth:
         panels.insert(0, Panel("truth", None, tuple(truth), fill_truth=True))
@@ -265,7 +281,7 @@ def _cell(skin: Skin, small: bool) -> Cell:
 
 
 def _columns(count: int, cell: Cell, size: float) -> int:
-    """As many columns as bring a picture near ASPECT."""
+    """Return the number of columns that brings a picture near ASPECT with few empty places."""
     high = cell.height + cell.below + GAP + LINE * size / 8.5
 
     def off(columns: int) -> float:
@@ -298,7 +314,8 @@ def _figure(page: FigurePage) -> Figure:
 
 
 def _axes(figure: Figure, page: FigurePage, place: tuple[float, float, float, float]) -> Axes:
-    """Axes at ``place``: left, top, width and height in inches from the page's upper left."""
+    """Return axes at ``place``: left, top, width and height in inches from the page's upper
+    left."""
     left, top, width, height = place
     bottom = page.height - top - height
     matplotlib = load_matplotlib()

@@ -1,8 +1,9 @@
-"""Pictures of frames: the skin with its electrodes, the image, the touches that were there and
-those that were found.
+"""Draw pictures of frames: the skin with its electrodes, the image, the true touches and the found
+ones.
 
-x to the right, y up, seen from above, mm. Red is more conductive than the untouched skin, blue
-less, white no change. matplotlib is imported when a picture is drawn, and needs no display.
+x points to the right and y up, seen from above, in mm. Red is more conductive than the untouched
+skin, blue less, and white is no change. matplotlib is imported when a picture is drawn, and needs
+no display.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ ELECTRODE = "#b8860b"
 TRUE = "#111111"
 FOUND = "#00796b"
 COLOURS = "RdBu_r"
-MARGIN, SMALL_MARGIN = 0.10, 0.03  # around a skin, of its larger side
-PLACE_90 = 4.605  # chi-squared of two numbers that 90 % lie below
+MARGIN, SMALL_MARGIN = 0.10, 0.03  # around a skin, as fractions of its larger side
+PLACE_90 = 4.605  # 90 % quantile of chi-squared with two degrees of freedom
 Place = tuple[float, float, float]
 STYLE = {
     "font.size": 9.0,
@@ -47,9 +48,14 @@ STYLE = {
 
 @dataclass(frozen=True)
 class Mark:
-    """A touch in a picture: its centre, its radius where known, its change of conductivity where
-    known, the covariance of its place (xx, xy, yy) where known, half of its long axis where it is
-    an ellipse."""
+    """A touch in a picture.
+
+    Attributes:
+        radius_mm: its radius, or None if unknown.
+        change: its change of conductivity, or None if unknown.
+        place_mm2: the covariance of its place (xx, xy, yy), or None if unknown.
+        long_mm: half of its long axis if it is an ellipse.
+    """
 
     x_mm: float
     y_mm: float
@@ -60,7 +66,7 @@ class Mark:
 
 
 def found_mark(touch: Touch) -> Mark:
-    """The mark of a touch that was found."""
+    """Return the mark of a found touch."""
     xx, xy, yy = touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2
     place = None if xx is None or xy is None or yy is None else (xx, xy, yy)
     long_mm = None if touch.long_x_mm is None else (touch.long_x_mm, touch.long_y_mm or 0.0)
@@ -69,15 +75,16 @@ def found_mark(touch: Touch) -> Mark:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One skin in a picture.
+    """A skin in a picture.
 
     Attributes:
-        title: above it.
-        values: (n,) pixel values, or None for none.
-        truth: touches that were there: circles, filled with their change where ``fill_truth``.
-        found: touches that were found: crosses, dashed discs or ellipses where that is known, and
-            ellipses in which the true centre lies with 90 % where that is.
-        fill_truth: show the truth as an image would.
+        title: the heading above it.
+        values: pixel values (n,), or None for no image.
+        truth: true touches, drawn as circles, filled with their change if ``fill_truth`` is set.
+        found: found touches, drawn as crosses, with dashed discs or ellipses if their size is
+            known, and with ellipses that contain the true centre with a probability of 90 % if
+            that is known.
+        fill_truth: draw the truth in the colours of an image.
     """
 
     title: str
@@ -88,7 +95,11 @@ class Panel:
 
 
 def load_matplotlib() -> Any:
-    """matplotlib, set to draw without a display."""
+    """Return matplotlib, set up to draw without a display.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+    """
     try:
         import matplotlib
         import matplotlib.backends.backend_agg
@@ -108,9 +119,10 @@ def draw_panel(
     limit: float | None = None,
     small: bool = False,
 ) -> Any:
-    """Draw one panel on ``axes`` and return what a colour bar needs.
+    """Draw a panel on ``axes``, and return what a colour bar needs.
 
-    Colours reach from -``limit`` to ``limit``; with None values are divided by the largest of them.
+    Colours range from -``limit`` to ``limit``; without a limit, values are divided by the largest
+    of them.
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -171,7 +183,7 @@ def _circle(axes: Axes, mark: Mark, radius_mm: float, **style: Any) -> None:
 
 
 def _shape(axes: Axes, mark: Mark, radius_mm: float, **style: Any) -> None:
-    """The disc, or the ellipse, that a touch was found to be."""
+    """Draw the disc or ellipse of a found touch."""
     from matplotlib.patches import Ellipse
 
     if mark.long_mm is None:
@@ -185,20 +197,20 @@ def _shape(axes: Axes, mark: Mark, radius_mm: float, **style: Any) -> None:
 
 
 def _place_ellipse(axes: Axes, mark: Mark, place_mm2: Place, **style: Any) -> None:
-    """In which the true centre lies with a probability of 90 %."""
+    """Draw the ellipse that contains the true centre with a probability of 90 %."""
     from matplotlib.patches import Ellipse
 
     xx, xy, yy = place_mm2
-    variances, axes_of_it = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
+    variances, directions = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
     short, long = 2 * np.sqrt(PLACE_90 * np.maximum(variances, 0))
-    x, y = axes_of_it[:, 1]
+    x, y = directions[:, 1]
     turn = math.degrees(math.atan2(y, x))
     axes.add_patch(Ellipse((mark.x_mm, mark.y_mm), long, short, angle=turn, fill=False, **style))
 
 
 def _draw_electrodes(axes: Axes, skin: Skin, small: bool) -> None:
-    """Electrodes as bars on the rim, numbered from 0 outside it where there is room; axes to
-    match."""
+    """Draw electrodes as bars on the rim, numbered from 0 unless ``small`` is set, and set the
+    limits of the axes."""
     outline = skin.outline
     x0, y0, x1, y1 = outline.bounding_box_mm
     size = max(x1 - x0, y1 - y0)
@@ -222,6 +234,6 @@ def _draw_electrodes(axes: Axes, skin: Skin, small: bool) -> None:
 
 
 def largest(values: npt.ArrayLike) -> float:
-    """The largest size of ``values``, 1 where all are 0 or there are none."""
+    """Return the largest absolute value of ``values``, or 1 if all are 0 or there are none."""
     sizes = np.abs(np.asarray(values, dtype=np.float64))
     return float(sizes.max()) if sizes.size and sizes.max() > 0 else 1.0

@@ -1,5 +1,5 @@
-"""A scene at a glance: the touches' paths on the skin, and what the electrodes see of them over
-time."""
+"""Draw an overview of a scene: the touches' paths on the skin, and the voltages of the electrodes
+over time."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,8 +20,8 @@ MAX_OUTLINES = 12
 
 
 def draw_scene(path: str | Path, scene: Scene, frames: Frames) -> None:
-    """The picture of ``scene`` and its ``frames`` as a PNG: touches by time | voltage changes by
-    row and time."""
+    """Write the picture of ``scene`` and its ``frames``: touches by time on the left, voltage
+    changes by row and time on the right."""
     matplotlib = load_matplotlib()
     with matplotlib.rc_context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(9.6, 4.9), layout="constrained")
@@ -39,7 +39,7 @@ def draw_scene(path: str | Path, scene: Scene, frames: Frames) -> None:
 
 
 def _draw_touches(axes: "Axes", scene: Scene) -> None:
-    """Each touch's path, and its outline at up to twelve times, stronger where it presses
+    """Draw each touch's path, and its outline at up to twelve times, more opaque if it presses
     harder."""
     from matplotlib import colormaps
     from matplotlib.patches import Circle

@@ -1,4 +1,4 @@
-"""A board's frames as a picture: one frame at large, or a panel a frame."""
+"""Draw a board's frames: one frame at large, or a panel per frame."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,12 +17,12 @@ MAX_KEPT = 20 * MAX_PANELS
 
 
 class Album:
-    """Keeps frames for a picture: all of them, or of a long stream evenly spaced ones and the
+    """Keeps frames for a picture: all of them, or for a long stream evenly spaced ones and the
     last."""
 
     def __init__(self) -> None:
         self._kept: list[Frame] = []
-        self._step, self.count = 1, 0  # how many were added
+        self._step, self.count = 1, 0  # every how many frames one is kept; how many were added
         self._last: Frame | None = None
 
     def add(self, frame: Frame) -> None:
@@ -34,15 +34,21 @@ class Album:
         self._last = frame
 
     def spread(self, most: int = MAX_PANELS) -> list[Frame]:
-        """At most ``most`` (up to 360), evenly spaced, the first and the last among them."""
+        """Return at most ``most`` (up to 360) frames, evenly spaced, including the first and the
+        last."""
         if self._last is None or self._kept[-1] is self._last:
             return _spread(self._kept, most)
         return _spread([*self._kept, self._last], most)
 
 
 def draw_stream(path: str | Path, model: Model, album: Album, *, title: str) -> None:
-    """The album as a PNG: circles are true touches, crosses what was found, dashed circles the
-    found touches' sizes."""
+    """Write the album as a picture: circles are true touches, crosses found ones, and dashed
+    circles the sizes of found touches.
+
+    Raises:
+        UsageError: the suffix is not that of a picture.
+        MissingExtraError: matplotlib is not installed.
+    """
     frames = album.spread()
     panels = [_panel(model, frame) for frame in frames]
     if len(panels) == 1:
@@ -63,7 +69,12 @@ def film_stream(
     *,
     progress: Progress = silent,
 ) -> None:
-    """The album as a film. Raises as ``draw_stream``."""
+    """Write the album as a film.
+
+    Raises:
+        UsageError: the suffix is not that of a film.
+        MissingExtraError: matplotlib or pillow is not installed.
+    """
     frames = album.spread(MAX_FRAMES)
     times_s = [frame.time_s for frame in frames]
     draw_film(path, model, [_panel(model, frame) for frame in frames], times_s, progress=progress)
@@ -93,7 +104,7 @@ def _found_marks(frame: Frame) -> tuple[Mark, ...]:
 
 
 def _spread(frames: Sequence[Frame], most: int) -> list[Frame]:
-    """At most ``most`` of ``frames``, evenly, the first and the last among them."""
+    """Return at most ``most`` of ``frames``, evenly spaced, including the first and the last."""
     if len(frames) <= most:
         return list(frames)
     return [frames[round(k * (len(frames) - 1) / (most - 1))] for k in range(most)]

@@ -1,5 +1,5 @@
-"""A picture of what was taught: presses with where the others put them, error by number of presses,
-what each row explains. Needs matplotlib."""
+"""Draw the result of teaching: each press with its place as estimated from the other presses, the
+error by number of presses, and how much of each row is explained. Needs matplotlib."""
 
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ def draw_taught(path: str | Path, taught: Taught) -> None:
         rim = np.array(taught.model.skin.outline.vertices_mm)
         left.plot(*np.vstack([rim, rim[:1]]).T, color="#444", lw=0.8)
     left.set(aspect="equal", xlabel="mm")
-    _title(left, "presses, and where the others put them")
+    _title(left, "presses, and their places estimated from the others")
     curve = taught.report["held_out_by_presses"]
     for kind, style in (("measured", "o-"), ("expected", "o:")):
         points = [(int(n.split("_")[1]), v) for n, v in curve.items() if n.startswith(kind)]
@@ -40,7 +40,7 @@ def draw_taught(path: str | Path, taught: Taught) -> None:
     middle.legend(frameon=False)
     right.plot(taught.left_out.explained, ".", color=GIVEN, ms=4)
     right.set(xlabel="row", ylim=(-0.1, 1))
-    _title(right, "energy that the others explain")
+    _title(right, "share of energy explained by the others")
     for panel in (left, middle, right):
         panel.spines[["top", "right"]].set_visible(False)
     save_picture(figure, path)

@@ -1,4 +1,5 @@
-"""A template in true size to lay on the skin: its outline, its electrodes, and where to press."""
+"""Draw a template in true size to lay on the skin: its outline, its electrodes, and where to
+press."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,14 +24,22 @@ SUFFIXES = (".pdf", ".svg")
 
 
 def check_template(path: Path) -> None:
-    """Refuse a template that cannot be drawn, before anything is done for it."""
+    """Raise an error if the template cannot be drawn, before any work is done for it.
+
+    Raises:
+        UsageError: the suffix is not that of a template.
+        MissingExtraError: matplotlib is not installed.
+    """
     check_path(path, SUFFIXES, "template in true size")
     load_matplotlib()
 
 
 def draw_template(path: Path, skin: Skin, place_mm: FloatArray) -> int:
-    """Draw places (n, 2) on ``skin`` in true size: as PDF on as many A4 pages as it takes, to be
-    laid edge to edge, as SVG on one page of its own size. Returns the number of pages."""
+    """Draw places (n, 2) in mm on ``skin`` in true size, and return the number of pages.
+
+    A PDF has as many A4 pages as are needed, to be laid edge to edge; an SVG has one page of its
+    own size.
+    """
     check_template(path)
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -58,7 +67,7 @@ def draw_template(path: Path, skin: Skin, place_mm: FloatArray) -> int:
 
 
 def _page_for(size_mm: FloatArray) -> FloatArray:
-    """A4 upright or across, whichever takes fewer pages."""
+    """Return the size of an A4 page, upright or across, whichever needs fewer pages."""
     pages = [np.array(PAGE_MM), np.array(PAGE_MM[::-1])]
     return min(pages, key=lambda page: float(np.prod(np.ceil(size_mm / (page - 2 * MARGIN_MM)))))
 

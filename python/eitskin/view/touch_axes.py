@@ -1,4 +1,4 @@
-"""One skin with its image and touches on matplotlib axes, for notebooks and figures of your own."""
+"""Draw a skin with its image and touches on matplotlib axes, for notebooks and your own figures."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -27,12 +27,12 @@ def draw_touches(
     title: str = "",
     ax: "Axes | None" = None,
 ) -> "Axes":
-    """The skin of ``model`` with an ``image`` (n,) in S/m, touches found (crosses) and ``true``
-    (circles), on ``ax``, or on axes of a new figure. Returns the axes.
+    """Draw the skin of ``model`` with an ``image`` (n,) in S/m, found touches as crosses and
+    ``true`` ones as circles. Return the axes: ``ax``, or those of a new figure.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
-        ConfigError: the model does not say which skin it is for.
+        ConfigError: the model does not hold the skin that it is for.
     """
     matplotlib = load_matplotlib()
     values = None if image is None else np.asarray(image, dtype=np.float64)
@@ -53,7 +53,8 @@ def touches_png(
     image: npt.ArrayLike | None,
     true: Sequence[TrueTouch] = (),
 ) -> bytes:
-    """The same as the bytes of a PNG, for ``_repr_png_``. Raises as ``draw_touches``."""
+    """Return the picture of ``draw_touches`` as the bytes of a PNG, for ``_repr_png_``. Raises the
+    same errors."""
     axes, data = draw_touches(model, touches, image, true=true), BytesIO()
     axes.figure.figure.savefig(data, format="png", dpi=DPI)
     return data.getvalue()

@@ -10,7 +10,7 @@ supply switched off too.
 from dataclasses import dataclass
 from typing import Any
 
-from eitskin.tuning.front import Conditions, Front, Point, load_front
+from eitskin.tuning.front import Conditions, Front, OperatingPoint, load_front
 from eitskin_studies.harness.sections import Filling, Tabular, text_table
 
 KEPT_MIOU = 0.84
@@ -78,7 +78,7 @@ def measuring_mw() -> float:
     return sum(one.mw() for one in ALWAYS)
 
 
-def energy_of(point: Point, where: Conditions) -> PointEnergy | None:
+def energy_of(point: OperatingPoint, where: Conditions) -> PointEnergy | None:
     """None where accuracy or instructions were not measured, or the board does not hold it."""
     solve_us, miou = point.cost("us", "f767", where), point.accuracy(where)
     if solve_us is None or miou is None or not point.fits_f767:

@@ -14,9 +14,9 @@ from eitskin.tuning.front import (
     REPORT_US,
     Conditions,
     Front,
-    Point,
+    OperatingPoint,
     choose,
-    preset,
+    named_preset,
 )
 from eitskin.tuning.report_time import report_us
 from eitskin.view.panels import save_picture
@@ -64,18 +64,18 @@ def draw_report_time(path: Path, front: Front) -> None:
         save_picture(figure, path)
 
 
-def chosen_presets(points: Sequence[Point], board: str) -> dict[str, Point]:
+def chosen_presets(points: Sequence[OperatingPoint], board: str) -> dict[str, OperatingPoint]:
     """The point of each preset on ``board``, where there is one."""
     found = {}
     for name in PRESETS:
         try:
-            found[name] = choose(points, preset(name, board))
+            found[name] = choose(points, named_preset(name, board))
         except UsageError:
             continue
     return found
 
 
-def _draw_board(axes: Axes, points: Sequence[Point], board: str) -> None:
+def _draw_board(axes: Axes, points: Sequence[OperatingPoint], board: str) -> None:
     label, colour = BOARDS[board]
     usable = [one for one in points if board == "host" or one.fits_f767]
     line = pareto(
@@ -133,7 +133,7 @@ def _draw_peers(axes: Axes, peers: Sequence[dict[str, Any]]) -> None:
         )
 
 
-def _mark(point: Point, board: str) -> tuple[float, float, float, float]:
+def _mark(point: OperatingPoint, board: str) -> tuple[float, float, float, float]:
     score = point.score(Conditions())
     assert score is not None
     image = score["image"]

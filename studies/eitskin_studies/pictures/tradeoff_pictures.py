@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eitskin.tuning.front import F767_MHZ, Conditions, Front, Point
+from eitskin.tuning.front import F767_MHZ, Conditions, Front, OperatingPoint
 from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, STYLE, load_matplotlib
 from eitskin_studies.pictures.report_time_picture import draw_report_time
@@ -60,7 +60,9 @@ def draw_front(path: Path, front: Front) -> None:
         save_picture(figure, path)
 
 
-def _draw_one_front(axes: Axes, points: Sequence[Point], where: Conditions, counted: bool) -> None:
+def _draw_one_front(
+    axes: Axes, points: Sequence[OperatingPoint], where: Conditions, counted: bool
+) -> None:
     best = best_points(points, where)
     named = {one.name for one in best}
     for point in points:
@@ -115,7 +117,9 @@ def _to_instructions(ms: Any) -> Any:
     return ms * F767_MHZ / 1e3
 
 
-def _name(axes: Axes, best: Sequence[Point], xs: Sequence[float], ys: Sequence[float]) -> None:
+def _name(
+    axes: Axes, best: Sequence[OperatingPoint], xs: Sequence[float], ys: Sequence[float]
+) -> None:
     """Names beside the dots, below right where the curve is steep; where they crowd, spread
     downwards and joined by a line."""
     low, high = axes.get_ylim()
@@ -149,10 +153,12 @@ def _plain_ticks(axis: Any) -> None:
     axis.set_minor_formatter(ticker.NullFormatter())
 
 
-def families(points: Sequence[Point], knob: str, free: tuple[str, ...] = ()) -> list[list[Point]]:
+def families(
+    points: Sequence[OperatingPoint], knob: str, free: tuple[str, ...] = ()
+) -> list[list[OperatingPoint]]:
     """Points that differ in ``knob`` alone (and their names, and the fields in ``free``), three
     values or more each (of solvers two); the largest family first."""
-    groups: dict[tuple[Any, ...], list[Point]] = {}
+    groups: dict[tuple[Any, ...], list[OperatingPoint]] = {}
     for one in points:
         fields = one.configuration.as_dict()
         groups.setdefault(
@@ -188,7 +194,7 @@ def draw_knobs(path: Path, front: Front) -> None:
         save_picture(figure, path)
 
 
-def _draw_knob(axes: Axes, groups: Sequence[Sequence[Point]], knob: str) -> None:
+def _draw_knob(axes: Axes, groups: Sequence[Sequence[OperatingPoint]], knob: str) -> None:
     for number, group in enumerate(groups):
         values = [getattr(one.configuration, knob) for one in group]
         places = list(range(len(values))) if knob in WORDS else values
@@ -227,7 +233,7 @@ def _draw_knob(axes: Axes, groups: Sequence[Sequence[Point]], knob: str) -> None
     axes.legend(frameon=False, fontsize=7)
 
 
-def _base_name(group: Sequence[Point]) -> str:
+def _base_name(group: Sequence[OperatingPoint]) -> str:
     """The name of a family's member that most of the others are named after."""
     return max(
         (one.name for one in group),

@@ -12,7 +12,7 @@ from eitskin.tuning.front import (
     SHORT_CELL,
     VERSION,
     Front,
-    Point,
+    OperatingPoint,
     load_front,
 )  # fmt: skip
 
@@ -62,13 +62,13 @@ def kept_cells(front: Front) -> Front:
             }
             for name, cells in one.scores.items()
         }
-        kept.append(Point(**{**vars(one), "scores": scores}))
+        kept.append(OperatingPoint(**{**vars(one), "scores": scores}))
     return Front(front.settings, tuple(kept), front.where_from)
 
 
 def in_short(front: Front) -> dict[str, Any]:
-    """What the package ships of a recorded front: what ``recommend`` and ``--budget`` look at.
-    Configurations without the keys that have their default, cells as numbers."""
+    """Return what the package ships of a recorded front: the part that ``recommend`` and
+    ``--preset`` read. Configurations omit the keys that have their default; cells are numbers."""
     usual = Configuration("").as_dict()
     points = []
     for one in front.points:
@@ -112,11 +112,11 @@ def _rounded(value: Any) -> Any:
 
 
 def pareto(
-    points: Sequence[Point],
-    cost: Callable[[Point], float | None],
-    accuracy: Callable[[Point], float | None],
+    points: Sequence[OperatingPoint],
+    cost: Callable[[OperatingPoint], float | None],
+    accuracy: Callable[[OperatingPoint], float | None],
     least_gain: float = 0.0,
-) -> list[Point]:
+) -> list[OperatingPoint]:
     """Those that no other beats: none that costs no more is as accurate, less ``least_gain``.
     Cheapest first."""
     known = [
@@ -125,7 +125,7 @@ def pareto(
         if (c := cost(p)) is not None and (a := accuracy(p)) is not None
     ]
     best = float("-inf")
-    kept: list[Point] = []
+    kept: list[OperatingPoint] = []
     for _, negative, k in sorted(known):
         if -negative > best + (least_gain if kept else 0.0):
             best = -negative
@@ -134,7 +134,7 @@ def pareto(
 
 
 def estimated_instructions(
-    points: Sequence[Point], one: Configuration, macs: tuple[float, float]
+    points: Sequence[OperatingPoint], one: Configuration, macs: tuple[float, float]
 ) -> dict[str, Any] | None:
     """Instructions from MACs by the counted points of the same storage and solver (their mean
     instructions a MAC); None if there are none. An estimate, and called so."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from eitskin.errors import UsageError
 from eitskin.fileio import write_beside
-from eitskin.tuning.front import REPORT_US, Budget, Conditions, Front, Point, Target, choose
+from eitskin.tuning.front import REPORT_US, Conditions, Front, Limit, OperatingPoint, Preset, choose
 from eitskin_studies.harness.sections import Tabular, fill_marks
 from eitskin_studies.pictures.report_time_picture import chosen_presets
 from eitskin_studies.tradeoff.table import best_points
@@ -116,13 +116,13 @@ def recommendation_table(front: Front) -> Tabular:
     points = [one for one in front.points if not one.configuration.warm_start]
     for board, budgets in (("f767", F767_MS), ("host", HOST_MS)):
         for ms in budgets:
-            target = Target(Budget(1000.0 * ms, "us"), None, board, Conditions())
-            noisy = Target(target.budget, None, board, Conditions(snr_db=40.0), 20_800.0)
+            target = Preset(Limit(1000.0 * ms, "us"), None, board, Conditions())
+            noisy = Preset(target.limit, None, board, Conditions(snr_db=40.0), 20_800.0)
             mean, worst, calm = (
                 _chosen(points, one)
                 for one in (
                     target,
-                    Target(target.budget, None, board, Conditions(), worst=True),
+                    Preset(target.limit, None, board, Conditions(), worst=True),
                     noisy,
                 )
             )
@@ -138,19 +138,19 @@ def recommendation_table(front: Front) -> Tabular:
     return RECOMMENDED_HEAD, rows
 
 
-def _chosen(points: list[Point], target: Target) -> Point | None:
+def _chosen(points: list[OperatingPoint], target: Preset) -> OperatingPoint | None:
     try:
         return choose(points, target)
     except UsageError:
         return None
 
 
-def _cells(point: Point | None, where: Conditions) -> tuple[str, str]:
+def _cells(point: OperatingPoint | None, where: Conditions) -> tuple[str, str]:
     accuracy = None if point is None else point.accuracy(where)
     return ("none", "-") if point is None or accuracy is None else (point.name, _share(accuracy))
 
 
-def _times(point: Point | None, board: str) -> str:
+def _times(point: OperatingPoint | None, board: str) -> str:
     if point is None:
         return "-"
     both = [point.cost("us", board, Conditions(), worst) for worst in (False, True)]

@@ -19,7 +19,7 @@ from eitskin.skin.protocol import Protocol, adjacent
 from eitskin.skin.skin import Skin, paper_skin
 from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY
 from eitskin.tuning.configuration import ELEMENTS, Configuration
-from eitskin.tuning.front import Front, Point
+from eitskin.tuning.front import Front, OperatingPoint
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sessions import FrameSession
 from eitskin_studies.harness.store import Store
@@ -172,7 +172,7 @@ def run(
     counted, why = _instructions(workspace, configurations, folder)
     times, kernels = _host(workspace, configurations)
     points = [
-        Point(
+        OperatingPoint(
             one,
             trained[one.name].threshold,
             trained[one.name].force_scale,
@@ -359,7 +359,7 @@ def _peers(workspace: _Desk, skin: Skin, protocol: Protocol) -> list[dict[str, A
     return [{**one, "host_us": us} for one, us in zip(peers, times, strict=True)]
 
 
-def _estimated(points: Sequence[Point]) -> list[Point]:
+def _estimated(points: Sequence[OperatingPoint]) -> list[OperatingPoint]:
     """``points``, where nothing was counted with an estimate from those that were, or from the
     recorded results."""
     if all(one.instructions is not None for one in points):
@@ -372,5 +372,5 @@ def _estimated(points: Sequence[Point]) -> list[Point]:
         score = one.scores[HEADLINE][f"{HEADLINE_DB:g}"]
         macs = (score["solve_macs"][0] + score["touch_macs"][0], score["most_macs"])
         counted = one.instructions or estimated_instructions(table, one.configuration, macs)
-        result.append(Point(**{**vars(one), "instructions": counted}))
+        result.append(OperatingPoint(**{**vars(one), "instructions": counted}))
     return result

@@ -5,14 +5,14 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-from eitskin.tuning.front import MIN_SWEEPS, Conditions, Front, Point
+from eitskin.tuning.front import MIN_SWEEPS, Conditions, Front, OperatingPoint
 from eitskin_studies.tradeoff.fronts import pareto
 
 MIN_GAIN = 0.002  # of MIoU: a fifth of the 95 % interval of 180 scenes
 COSTS = ("flash_bytes", "ram_bytes", "pixels_kept", "acquisition_us")
 
 
-def x_of(point: Point, where: Conditions) -> float | None:
+def x_of(point: OperatingPoint, where: Conditions) -> float | None:
     """What the front is drawn over: mean instructions of solve and touches, or where none are known
     MACs."""
     if point.instructions is not None:
@@ -21,7 +21,7 @@ def x_of(point: Point, where: Conditions) -> float | None:
     return None if macs is None else macs[0]
 
 
-def best_points(points: Sequence[Point], where: Conditions) -> list[Point]:
+def best_points(points: Sequence[OperatingPoint], where: Conditions) -> list[OperatingPoint]:
     """The Pareto front of points that begin each frame again and fit touches fully, in steps of
     ``MIN_GAIN`` or more."""
     alike = [
@@ -42,7 +42,7 @@ def to_csv(front: Front) -> str:
     return lines.getvalue()
 
 
-def _rows(point: Point) -> list[dict[str, Any]]:
+def _rows(point: OperatingPoint) -> list[dict[str, Any]]:
     instructions, host = point.instructions or {}, point.host_us or {}
     fixed = point.configuration.as_dict() | {
         "threshold": point.threshold,

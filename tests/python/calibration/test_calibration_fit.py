@@ -95,7 +95,7 @@ ALIKE = r"1\.14 times the least, which cannot show a law; use a range of 1\.5 ti
         (lambda p: p.take(np.flatnonzero(np.isin(p.force_n, [1.0, 1.5]))),
          "2 different weights are too few"),
         (lambda p: replace(p, force_n=1 + 0.1 * p.force_n), ALIKE),
-        (lambda p: replace(p, strength=1 / p.force_n), "strength does not grow with load"),
+        (lambda p: replace(p, strength=1 / p.force_n), "strength does not grow with force"),
     ],
     ids=["three", "one weight", "two weights", "weights too alike", "falling"],
 )  # fmt: skip

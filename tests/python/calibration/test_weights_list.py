@@ -26,7 +26,7 @@ def test_csv_and_toml_say_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("", "lists no weight; give frames and load of each"),
+        ("", "lists no weight; give the frames and the force of each"),
         ("first,weight_g\n", "lists no weight"),
         ("first,weight_kg\n0,1\n",
          "its first line: unknown key 'weight_kg'; did you mean 'weight_g'?"),
@@ -36,8 +36,8 @@ def test_csv_and_toml_say_the_same(tmp_path):
         ("first,weight_g\n0,nan\n", "weight_g = nan is out of range"),
         ("first,weight_g\n0,0\n", "weight_g = 0.0 is out of range; it must be above 0"),
         ("first,weight_g\n0,\n",
-         "give the load as weight_g (grams) or as force_n (newtons), one of them"),
-        ("first,weight_g,force_n\n0,1,1\n", "one of them"),
+         "give the force either as weight_g (grams) or as force_n (newtons)"),
+        ("first,weight_g,force_n\n0,1,1\n", "give the force either"),
         ("first,weight_g,x_mm\n0,1,1\n", "a place needs x_mm and y_mm; give both or none"),
         ("first,weight_g\n-1,5\n", "first = -1.0 is out of range"),
         ("first,last,weight_g\n5,4,5\n", "last = 4.0 is out of range; it must be at least 5"),

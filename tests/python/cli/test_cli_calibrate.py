@@ -74,8 +74,8 @@ def test_presses_that_it_never_saw_read_their_load(folder, done, told):
         assert np.hypot(touch["x_mm"] - place[0], touch["y_mm"] - place[1]) < 1
         assert touch["force_n"] / NEWTONS_PER_GRAM == pytest.approx(grams, rel=SOME)
     text = done(f"reconstruct {folder / 'new.npz'} --model {folder / 'skin.eitm'}")
-    assert "load g" in text.splitlines()[0]
-    assert "load g" not in done(f"reconstruct {folder / 'new.npz'}").splitlines()[0]
+    assert "force g" in text.splitlines()[0]
+    assert "force g" not in done(f"reconstruct {folder / 'new.npz'}").splitlines()[0]
 
 
 def test_it_says_what_it_found(folder, done, told):
@@ -86,11 +86,11 @@ def test_it_says_what_it_found(folder, done, told):
     assert model.meta["calibration"] == {key: facts[key] for key in model.meta["calibration"]}
     assert facts["error_rms"] < 0.03 and facts["scatter_after"] < 0.03
     lines = done(*arguments).splitlines()
-    assert lines[0] == "50 presses at 10 places, 200.0 g the greatest"
+    assert lines[0] == "50 presses at 10 places, up to 200.0 g"
     assert lines[-1] == "not stored; name a model with -o"
     info = done(f"model info {folder / 'skin.eitm'}")
-    assert "loads to 200.0 g, 95 % within" in info
-    assert "none; touches have no load" in done("model info")
+    assert "up to 200.0 g, 95 % within" in info
+    assert "none; touches have no force" in done("model info")
     done(f"model verify {folder / 'skin.eitm'}")
 
 
@@ -147,7 +147,9 @@ def test_weights_that_do_not_show_are_named(folder, tmp_path, ran):
 
 def test_refusals(folder, refused, tmp_path):
     frames, listed, own = folder / "weights.npz", folder / "weights.csv", tmp_path / "w.csv"
-    outside = "frames 50 to 50 of the list of weights are not there; it has frames 0 to 49"
+    outside = (
+        "frames 50 to 50 of the list of weights do not exist; the recording has frames 0 to 49"
+    )
     for code, arguments, rows, said in (
         (2, f"{frames} --weights {listed} --weights {listed}", "",
          "1 recordings and 2 lists of weights"),

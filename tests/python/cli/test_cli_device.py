@@ -197,13 +197,13 @@ def test_devices_asks_only_what_looks_like_a_board(scene, done, told, monkeypatc
     urls = {"auto", "serial:PORT", "text:PORT", "sim:SCENE", "emu:SCENE", "file:RUN.eits"}
     assert set(listed["urls"]) == urls
     assert f"serial:{path}  STM32 STLink, USB 0483:374b: simulated, firmware 0.1.0" in text
-    assert "serial:/dev/ttyS0: no board's" in text
-    assert quiet.count("a board's, not asked") == 2
+    assert "serial:/dev/ttyS0: not a board" in text
+    assert quiet.count("a board, not asked") == 2
 
 
 def test_no_port_at_all(done, monkeypatch):
     monkeypatch.setattr("eitskin.device.open.ports", lambda: [])
-    assert done("devices").startswith("no serial port; without a board, play with")
+    assert done("devices").startswith("no serial port; without a board, try")
 
 
 # ---- info, tare ----

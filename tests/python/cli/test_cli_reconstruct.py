@@ -78,7 +78,7 @@ def test_what_is_found_is_said(done, frames_file, tmp_path, capsys):
     assert listed[2]["info"]["outliers"] in (1, 2)
     assert listed[0]["info"]["masked"] == 0 and set(listed[0]["info"]["diagnostics"]) <= {"crowded"}
     main(["reconstruct", str(tmp_path / "spoilt.npz"), "--only", "test-s3-1"])
-    assert "found: electrode 5 open" in capsys.readouterr().out
+    assert "diagnostics: electrode 5 open" in capsys.readouterr().out
 
 
 def test_what_it_says_is_what_the_reconstructor_does(told, frames_file):
@@ -104,7 +104,7 @@ def test_threads_change_nothing(told, frames_file, ran):
         (("--threads", "0"), "use 1 to 256"),
         (("--threads", "2", "--warm"), "--warm starts each frame from the last one"),
         (("--threads", "2", "--track"), "--track needs one frame after another"),
-        (("--threads", "2", "--engine", "numpy"), "the numpy engine has one"),
+        (("--threads", "2", "--engine", "numpy"), "the numpy engine uses one thread"),
     ):
         assert text in ran(2, f"reconstruct {frames_file}", *arguments)[1]
 
@@ -146,9 +146,9 @@ def test_for_people(done, frames_file):
     lines = text.splitlines()
     found = " ".join(lines[0].split())
     assert found == "frame touch x mm y mm radius mm strength S/m mm2 error mm solve"
-    assert text.count("60 iterations (iterations), gap ") == 20
+    assert text.count("60 iterations (limit), gap ") == 20
     assert "20 frames, 0 refused; median " in text and " of " in lines[-1]
-    assert lines[-1].startswith("against the truth of 20")
+    assert lines[-1].startswith("compared with the truth of 20")
     assert sum(line.startswith("test-s3-") for line in lines) == 20
 
 
@@ -159,7 +159,7 @@ def test_quiet_frames_show_nothing(done, told, changed_frames):
     path = changed_frames(truth=False, **given)
     text = done(f"reconstruct {path}")
     assert text.count("none (no change above the noise)") >= 7
-    assert "against the truth" not in text
+    assert "compared with the truth" not in text
     facts = told(f"reconstruct {path}")
     assert "summary" not in facts
     assert {frame["info"]["stop"] for frame in facts["frames"]} <= {"below-threshold", "iterations"}
@@ -199,7 +199,7 @@ def test_a_reference_of_another_skin_is_warned_of(changed_frames, ran):
         voltage_v=session().frames_v[:, order], reference_voltage_v=session().quiet_v[:, order]
     )
     err = ran(0, f"reconstruct {path}")[1]
-    assert err.startswith("eitskin: warning: the reference correlates with the model by 0.")
+    assert err.startswith("eitskin: warning: the reference correlates with the model only by 0.")
     assert err.count("\n") == 1
     assert f"eitskin doctor {path}" in err
 
@@ -239,6 +239,7 @@ def test_the_whole_way(done, told, tmp_path):
     assert load_frames(frames_path).n_frames == 12
 
 
+@pytest.mark.long("test_the_demo_goes_without_an_emulator, test_the_whole_way")
 def test_the_demo(tmp_path, ran):
     out, err = ran(0, f"demo --picture {tmp_path / 'demo.png'} --json")
     facts = json.loads(out)

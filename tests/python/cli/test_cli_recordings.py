@@ -153,7 +153,7 @@ def test_one_bit_that_differs_is_found(kind, number, place, different, run, tmp_
     facts = json.loads(out)
     assert not facts["same_bits"] and facts["different"][0] == (18 if number != 3 else 16)
     assert different in (None, len(facts["different"]))
-    assert err == f"eitskin: {other}: this host's images are not the board's\n"
+    assert err == f"eitskin: {other}: this host's images differ from the board's\n"
 
 
 def lost(run: Path, target: Path, number: int = 16 + 1) -> Path:
@@ -198,7 +198,7 @@ def test_without_its_note_the_models_own_options_are_taken(done, told, scene, ru
     odd = tmp_path / "odd.eits"
     done(f"record --device sim:{scene} -o {odd}", *QUIETLY, "--iterations 5")
     said = ran(10, f"replay {unnoted(odd, 'plain2.eits')} --check")[1]
-    assert "the recording does not note the solver's options" in said
+    assert "the recording does not hold the solver's options" in said
 
 
 # ---- export ----

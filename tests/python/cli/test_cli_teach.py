@@ -75,7 +75,7 @@ BAD: dict[str, tuple[Callable[[Arrays], Arrays], int, str]] = {
     "one corner": (
         lambda a: {"place_mm": 0.01 * a["place_mm"] + 30},
         FRAME,
-        "press all over it (eitskin teach plan says where)",
+        "press all over it (eitskin teach plan chooses the places)",
     ),
     "a press with NaN": (
         with_value("pressed", (3, 2), np.nan),
@@ -138,7 +138,7 @@ def test_a_model_from_physics_is_none_to_adapt(refused, files, action):
     save_model(files / "physics.eitm", load_prebuilt()[0])
     out = ("-o", files / "new.eitm") if action == "update" else ()
     line = refused(MODEL, f"teach {action} {files / 'physics.eitm'} {files / 'good.npz'}", *out)
-    assert line.endswith("no press has taught; make one with  eitskin teach fit")
+    assert line.endswith("and was not taught; make one with  eitskin teach fit")
 
 
 def test_frames_without_a_press_leave_the_old_file(files, frames_file, ran):
@@ -147,8 +147,8 @@ def test_frames_without_a_press_leave_the_old_file(files, frames_file, ran):
     given = ["--plan", plan, "-o", files / "good.npz", "--frames", frames_file, "--overwrite"]
     skin = ["--skin", files / "skin.toml"]
     said = ran(FRAME, "teach record", *given, *skin)[1].splitlines()
-    assert said[0].endswith("off the skin 'small': places 2 of 2; are they in mm?")
-    assert said[1].endswith("as the frames ended before any press of the plan was held")
+    assert said[0].endswith("outside the skin 'small': places 2 of 2; are they in mm?")
+    assert said[1].endswith("because the frames ended before any press of the plan was held")
     assert (files / "good.npz").read_bytes() == old
 
 
@@ -162,4 +162,4 @@ def test_a_board_of_other_electrodes_is_told_before_any_press(refused, files):
     plan.write_text("x_mm,y_mm\n1,2\n")
     given = ("--plan", plan, "-o", files / "new.npz", "--skin", files / "skin.toml")
     line = refused(PROTOCOL, "teach record", *given, "--device sim:hydrogel")
-    assert "8 electrodes, but the board scans 16; give it a model of this skin first" in line
+    assert "8 electrodes, but the board scans 16; build" in line

@@ -366,7 +366,7 @@ def test_the_example_of_a_source_is_one(monkeypatch):
         ("[channels]\nequalise = true\n", "equalise needs a whole file"),
         ("[channels]\nmirror = 1\n", "mirror must be true or false"),
         ("[channels]\ntable = [[0, 1, 2, 99]]\n", "the table names electrodes 0 to 99"),
-        ("[channels]\ntable = [[0, 1, 2, 3]]\n", "have not all rows of the model's protocol"),
+        ("[channels]\ntable = [[0, 1, 2, 3]]\n", "lack rows of the model's protocol"),
         ('[protocol]\nkind = "opposite"\n', "'electrodes' is required"),
         ("[port]\nrate_hz = 0\n", "out of range"),
         ("lines = 3\n", r"lines must be a table: write \[lines\]"),

@@ -33,7 +33,7 @@ def test_image_there_and_back():
     grid = grid_for(disk(100.0), 16)
     values = np.random.default_rng(1).normal(size=grid.n_pixels)
     assert np.array_equal(grid.values(grid.image(values)), values)
-    with pytest.raises(UsageError, match="one value a pixel"):
+    with pytest.raises(UsageError, match="one value per pixel"):
         grid.image(values[:-1])
     with pytest.raises(UsageError, match="image of shape"):
         grid.values(np.zeros((3, 3)))

@@ -166,7 +166,7 @@ def test_the_picture_is_drawn(tmp_path):
     save_frames(path, dead(quiet_only(healthy_frames(17)), 3))
     assert run("doctor", path, "--picture", tmp_path / "p.png") == 11
     assert (tmp_path / "p.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-    with pytest.raises(EitskinError, match=r"is no format of a picture; use \.png"):
+    with pytest.raises(EitskinError, match=r"is not a format of a picture; use \.png"):
         run("doctor", path, "--picture", tmp_path / "p.xyz")
 
 

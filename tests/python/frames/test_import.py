@@ -293,7 +293,7 @@ def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path):
     assert np.array_equal(back.voltage_v, -frames.voltage_v)
     assert np.array_equal(back.touch_xy_mm, frames.touch_xy_mm)
     assert back.meta["before"] == {} and back.meta["options"] == {"sign": "reversed"}
-    with pytest.raises(UsageError, match="a frames file already"):
+    with pytest.raises(UsageError, match="already a frames file"):
         taken(tmp_path / "a.npz", None)
     with pytest.raises(ProtocolError, match="another protocol"):
         import_frames(tmp_path / "a.npz", ImportOptions(), opposite(16), None)
@@ -344,7 +344,7 @@ def test_foreign_and_square_sources(tmp_path):
     np.savez(tmp_path / "square.npz", v=np.ones((40, 40)), r=np.ones(40), words=np.array(["a"]))
     with pytest.raises(UsageError, match="both sides fit; say --frames-in rows or columns"):
         taken(tmp_path / "square.npz", adjacent(8))
-    with pytest.raises(FrameError, match="holds <U1, no numbers"):
+    with pytest.raises(FrameError, match="holds <U1, not numbers"):
         words = ImportOptions(source=replace(KEYS, voltage="words"))
         import_frames(tmp_path / "square.npz", words, adjacent(8), None)
 

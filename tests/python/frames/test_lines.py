@@ -84,7 +84,7 @@ def test_bad_lines_are_named_or_left_out_and_counted(tmp_path):
         taken(path)
     assert taken(path, skip_bad_lines=True).shape == (10, 208)
     assert read_table(path, skip_bad_lines=True).notes == (
-        "2 lines left out that have not 208 cells, first line 1 with 207",
+        "2 lines left out that do not have 208 cells, first line 1 with 207",
     )
 
 
@@ -126,5 +126,5 @@ def test_steps_of_columns_and_long_lists():
 
 def test_a_foreign_file_for_a_frames_file_names_import(tmp_path):
     (tmp_path / "x.csv").write_text("1,2,3\n")
-    with pytest.raises(EitskinError, match=r"no frames file; make one of it:  eitskin import"):
+    with pytest.raises(EitskinError, match=r"not a frames file; convert it:  eitskin import"):
         load_frames(tmp_path / "x.csv")

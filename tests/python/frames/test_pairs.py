@@ -73,7 +73,7 @@ def test_without_a_header_it_must_be_said_unless_only_one_can_be(tmp_path):
     with pytest.raises(UsageError, match="a magnitude is below 0"):
         read(signed, complex_part="abs", pairs="magnitude-degrees")
     wide = pair_table(tmp_path / "w.csv", np.abs(Z), np.rad2deg(np.angle(Z)), None)
-    with pytest.raises(UsageError, match=r"a phase of 1\d\d.* is no number of radians"):
+    with pytest.raises(UsageError, match=r"a phase of 1\d\d.* cannot be in radians"):
         read(wide, complex_part="abs", pairs="magnitude-radians")
 
 

@@ -276,8 +276,8 @@ def changed(at: int, value: float) -> bytes:
         (changed(4, float("nan")), "a number in section 'UNCE' that is out of range"),
         (changed(8, -0.1), "a number in section 'UNCE' that is out of range"),
         (changed(20, float("inf")), "a number in section 'UNCE' that is out of range"),
-        (changed(20, 1.5), "a matrix in section 'UNCE' that is no covariance"),
-        (changed(28, -2.0), "a matrix in section 'UNCE' that is no covariance"),
+        (changed(20, 1.5), "a matrix in section 'UNCE' that is not a covariance"),
+        (changed(28, -2.0), "a matrix in section 'UNCE' that is not a covariance"),
     ],
 )
 def test_refused(content, said):
@@ -303,5 +303,5 @@ def test_a_process_that_fails_is_named(monkeypatch):
         draw_model_errors(replace(request(), projection=None), jobs=2)
     assert "\n" not in str(refused.value)
     monkeypatch.setattr(monte_carlo.sys, "executable", "/bin/false")
-    with pytest.raises(ModelError, match="ended before its time"):
+    with pytest.raises(ModelError, match="ended early"):
         draw_model_errors(request(), jobs=2)

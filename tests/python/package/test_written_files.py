@@ -29,7 +29,7 @@ def test_a_link_is_followed_and_stays_a_link(tmp_path):
 def test_links_in_a_circle_are_refused(tmp_path):
     (tmp_path / "a").symlink_to(tmp_path / "b")
     (tmp_path / "b").symlink_to(tmp_path / "a")
-    with pytest.raises(FileError, match="links go in a circle"):
+    with pytest.raises(FileError, match="links form a circle"):
         write_bytes(tmp_path / "a", b"")
 
 

@@ -49,7 +49,7 @@ def test_touches_are_paired_with_the_true_ones():
     assert seen.errors_mm == {0: pytest.approx(1.0), 1: pytest.approx(3.0)}
     text = line(seen)
     assert text.count("off by") == 2 and "#1 (30.0, -24.0) mm" in text
-    assert "3.00 S/m mm2, false; 60 iterations (iterations), gap 1.0e-02, " in text
+    assert "3.00 S/m mm2, false; 60 iterations (limit), gap 1.0e-02, " in text
     assert text.endswith(" ms")
     facts = seen.message()
     found = [touch["error_mm"] for touch in facts["touches"]]

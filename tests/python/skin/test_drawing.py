@@ -271,7 +271,7 @@ def test_other_refusals(tmp_path):
         ("none.svg", FileError, "no such drawing"),
         ("a.png", ConfigError, r"must be \.svg or \.dxf"),
         ("b.svg", ConfigError, "not an SVG drawing but <html>"),
-        ("a.dxf", ConfigError, r"\$INSUNITS = 0 is no unit of length; give scale_mm"),
+        ("a.dxf", ConfigError, r"\$INSUNITS = 0 is not a unit of length; give scale_mm"),
     ):
         with pytest.raises(error, match=message):
             read_drawing(tmp_path / name, DrawingReading())

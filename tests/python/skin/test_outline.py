@@ -93,7 +93,7 @@ def test_clockwise_is_turned_and_a_closing_point_dropped():
         ([(0, 0), (0.1, 0), (0, 0.1)], "out of range"),
         ([(0, 0), (1e7, 0), (0, 1e7)], "out of range"),
         ([(0, 0), (10, float("nan")), (0, 10)], "point 1 .* not finite"),
-        ([(0, 0), (1000, 999.9), (1000, 1000)], "next to nothing"),
+        ([(0, 0), (1000, 999.9), (1000, 1000)], "too small for its size"),
     ],
 )
 def test_refused_polygons(vertices, message):

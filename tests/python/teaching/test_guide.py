@@ -163,7 +163,10 @@ def test_a_plan_that_is_none(text, said, tmp_path):
         load_plan(tmp_path / "plan.csv")
 
 
-@pytest.mark.parametrize("kind", ["sim", "emu"])
+@pytest.mark.parametrize(
+    "kind",
+    ["sim", pytest.param("emu", marks=pytest.mark.long("sim, and emulator/test_taught_model.py"))],
+)
 def test_a_whole_session(kind, tmp_path, capsys, monkeypatch):
     """Plan, practise 20 presses, fit, check, then touch with the taught model, as a person would;
     the board's images are this host's."""

@@ -4,7 +4,7 @@ import pytest
 
 from eitskin.device.settings import SolverSettings
 from eitskin.errors import ConfigError, FileError, UsageError
-from eitskin.tuning.front import Budget, choose, load_front, read_budget
+from eitskin.tuning.front import Limit, choose, load_front, read_limit
 from made_points import COLD, HERE, point, target
 
 
@@ -34,7 +34,7 @@ def test_the_right_point_is_chosen(asked, name):
     chosen = choose(COLD, wanted)
     assert chosen.name == name
     cost = chosen.cost(wanted.unit, wanted.board, HERE, wanted.worst)
-    assert cost is not None and (wanted.budget is None or cost <= wanted.budget.value)
+    assert cost is not None and (wanted.limit is None or cost <= wanted.limit.value)
     assert (chosen.accuracy(HERE) or 0) >= (wanted.accuracy or 0)
 
 
@@ -75,17 +75,17 @@ def test_boards_get_only_what_they_can_be_told():
 @pytest.mark.parametrize(
     ("text", "budget"),
     [
-        ("10ms", Budget(10_000, "us")),
-        ("800us", Budget(800, "us")),
-        ("0.05 s", Budget(50_000, "us")),
-        ("600kMACs", Budget(600_000, "MACs")),
-        ("1MMAC", Budget(1e6, "MACs")),
-        ("2.5Minstructions", Budget(2.5e6, "instructions")),
-        ("70000instructions", Budget(70_000, "instructions")),
+        ("10ms", Limit(10_000, "us")),
+        ("800us", Limit(800, "us")),
+        ("0.05 s", Limit(50_000, "us")),
+        ("600kMACs", Limit(600_000, "MACs")),
+        ("1MMAC", Limit(1e6, "MACs")),
+        ("2.5Minstructions", Limit(2.5e6, "instructions")),
+        ("70000instructions", Limit(70_000, "instructions")),
     ],
 )
 def test_budgets_are_read(text, budget):
-    assert read_budget(text) == budget
+    assert read_limit(text) == budget
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_budgets_are_read(text, budget):
 )
 def test_what_is_no_budget_is_refused(text):
     with pytest.raises(UsageError, match="--budget"):
-        read_budget(text)
+        read_limit(text)
 
 
 def test_files_that_are_no_results_are_refused(tmp_path):

@@ -76,7 +76,9 @@ def assert_whole(figure: Any) -> None:
 
 
 @pytest.mark.parametrize("name", SKINS)
-@pytest.mark.parametrize("count", (1, 2, 12))
+@pytest.mark.parametrize(
+    "count", (1, pytest.param(2, marks=pytest.mark.long("1 and 12 panels")), 12)
+)
 def test_every_text_is_whole(name, count):
     skin, given = SKINS[name], panels(SKINS[name], count)
     grid = grid_for(skin.outline)
@@ -143,5 +145,5 @@ def test_a_film_of_frames(tmp_path, kind):
     assert durations == [100, 2000, 2000]
     kept = thinned(10 * MAX_FRAMES + 7)
     assert len(kept) == MAX_FRAMES and (kept[0], kept[-1]) == (0, 10 * MAX_FRAMES + 6)
-    with pytest.raises(UsageError, match=r"'\.mp4' is no format of a film; use \.webp, \.gif"):
+    with pytest.raises(UsageError, match=r"'\.mp4' is not a format of a film; use \.webp, \.gif"):
         draw_film(tmp_path / "f.mp4", model, few, [0.0, 0.1, 5.0])

@@ -1,5 +1,5 @@
-"""The doctor: what is wrong with frames, said before any image is made of them. One file a
-check."""
+"""The doctor: it finds out what is wrong with frames before any image is made of them. Each check
+has its own file."""
 
 from eitskin.frames.doctor.examine import examine
 from eitskin.frames.doctor.report import DoctorReport, Finding

@@ -1,5 +1,5 @@
-"""The case before the checks: frames in one order, the prediction to hold them against, which
-channels to trust."""
+"""The case that the checks work on: the frames in one order, the prediction to compare them with,
+and which rows can be trusted."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -19,12 +19,12 @@ SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """``frames`` (voltages may be NaN) against ``transfer_ohm`` (n, n), for the electrodes that
-    ``rows`` (m, 4) name.
+    """The ``frames`` (voltages may be NaN) and the transfer matrix ``transfer_ohm`` (n, n) to
+    compare them with, for the electrodes that ``rows`` (m, 4) name.
 
-    ``trusted`` (m,): channels that no earlier check has found unusable. ``magnitude``: signs are
-    not known. ``prediction`` is the healthy skin's; ``transfer_ohm`` differs from its own where
-    electrodes are joined.
+    ``trusted`` (m,) marks the rows that no earlier check has found unusable. With ``magnitude`` the
+    signs are unknown. ``prediction`` is that of the healthy skin; ``transfer_ohm`` differs from its
+    matrix if electrodes are joined.
     """
 
     frames: Frames
@@ -41,7 +41,7 @@ class Case:
 
     @property
     def reference(self) -> FloatArray:
-        """The mean quiet frame (m,), 0 where it is not finite."""
+        """The mean untouched frame (m,), 0 where it is not finite."""
         with np.errstate(invalid="ignore", over="ignore"):
             return np.asarray(
                 np.nan_to_num(self.frames.reference_voltage_v.mean(axis=0), posinf=0.0, neginf=0.0)
@@ -49,30 +49,30 @@ class Case:
 
     @property
     def predicted(self) -> FloatArray:
-        """The homogeneous frame (m,) per ampere."""
+        """The predicted homogeneous frame (m,) per ampere."""
         return voltages_of(self.transfer_ohm, self.rows)
 
     @property
     def joined(self) -> bool:
-        """Whether two electrodes were found joined, so that single channels are known only
+        """Return whether two electrodes were found joined, so that single rows are predicted only
         roughly."""
         return self.transfer_ohm is not self.prediction.transfer_ohm
 
     def expected(self) -> FloatArray:
-        """The homogeneous frame (m,) as these channels would measure it, in volts: see
+        """Return the homogeneous frame (m,) in volts as these rows would measure it; see
         ``calibrated``."""
         return calibrated(self.reference, self.predicted, self.trusted)
 
     def channel(self, number: int) -> str:
-        """ "channel 17 [1, 2, 8, 9]"."""
+        """Return a name such as "channel 17 [1, 2, 8, 9]"."""
         return f"channel {number} {self.rows[number].tolist()}"
 
 
 def strength_groups(size: FloatArray, usable: BoolArray) -> list[IntArray]:
-    """The ``usable`` channels (m,) sorted by ``size`` (m,) in groups of at least GROUP, never
-    parting equal sizes.
+    """Sort the ``usable`` rows (m,) by ``size`` (m,) and split them into groups of at least GROUP;
+    equal sizes stay together.
 
-    On a round skin a group is made of channels that symmetry makes equal.
+    On a round skin the rows of a group are equal by symmetry.
     """
     order = np.flatnonzero(usable)[np.argsort(size[usable], kind="stable")]
     cuts = [0]
@@ -84,12 +84,12 @@ def strength_groups(size: FloatArray, usable: BoolArray) -> list[IntArray]:
 
 
 def calibrated(measured: FloatArray, predicted: FloatArray, trusted: BoolArray) -> FloatArray:
-    """``predicted`` (m,) scaled to ``measured`` (m,) by robust ratios, so that only single channels
-    stand out.
+    """Return ``predicted`` (m,) scaled to ``measured`` (m,) by robust ratios, so that only single
+    rows stand out.
 
-    The ratio of a group of like channels (``strength_groups``) is its median of measured /
-    predicted over ``trusted`` channels; between groups it is interpolated over log |predicted|. It
-    takes up what a real tank does to near and far.
+    The ratio of a group of similar rows (``strength_groups``) is the median of measured / predicted
+    over its ``trusted`` rows; between groups it is interpolated over log |predicted|. This absorbs
+    the deviation of a real tank, which differs for near and far pairs.
     """
     size = np.abs(predicted)
     usable = trusted & (size > SAME * size.max(initial=0.0))
@@ -104,32 +104,32 @@ def calibrated(measured: FloatArray, predicted: FloatArray, trusted: BoolArray) 
 
 
 def rms(values: FloatArray) -> float:
-    """Root mean square; 0 for none."""
+    """Return the root mean square, or 0 for an empty array."""
     return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
 
 
 def robust_spread(values: FloatArray) -> float:
-    """1.4826 times the median distance from the median: the standard deviation where the values are
-    normal."""
+    """Return 1.4826 times the median distance from the median, which is the standard deviation if
+    the values are normal."""
     return float(1.4826 * np.median(np.abs(values - np.median(values)))) if values.size else 0.0
 
 
 def cosine(a: FloatArray, b: FloatArray) -> float:
-    """Cosine between two frames; 0 where one is all zero."""
+    """Return the cosine between two frames, or 0 if one is all zero."""
     norm = float(np.linalg.norm(a) * np.linalg.norm(b))
     return float(a @ b) / norm if norm > 0 else 0.0
 
 
 def correlation(a: FloatArray, b: FloatArray) -> float:
-    """Pearson's correlation; 0 where one is constant."""
+    """Return Pearson's correlation, or 0 if one is constant."""
     return cosine(a - a.mean(), b - b.mean()) if a.size else 0.0
 
 
 def short_list(channels: Any) -> str:
-    """Channel numbers for a sentence, cut after eight."""
+    """Return row numbers for a sentence, truncated after eight."""
     return first_few(numbers(channels), 8)
 
 
 def numbers(array: Any) -> list[int]:
-    """Channel numbers as plain integers, for evidence."""
+    """Return row numbers as plain integers, for evidence."""
     return [int(value) for value in np.asarray(array).ravel()]

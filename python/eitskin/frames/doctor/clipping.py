@@ -1,5 +1,5 @@
-"""Saturated channels (many readings exactly at the greatest value) and stuck ones (quiet frames
-that never change)."""
+"""Find saturated rows (many readings exactly at the greatest value) and stuck rows (untouched
+frames that never change)."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ MIN_QUIET = 4
 
 
 def check_clipping(case: Case) -> tuple[Case, CheckOutcome]:
-    """Name channels at a rail, in quiet frames or others, and channels that are stuck."""
+    """Name rows that stand at a rail, in untouched or other frames, and rows that are stuck."""
     frames = np.vstack([case.frames.reference_voltage_v, case.frames.voltage_v])
     railed = at_rail(np.where(np.isfinite(frames), frames, 0.0))
     quiet = len(case.frames.reference_voltage_v)
@@ -52,12 +52,12 @@ def check_clipping(case: Case) -> tuple[Case, CheckOutcome]:
 
 
 def at_rail(frames: FloatArray) -> BoolArray:
-    """Which readings (f, m) stand exactly at the greatest or the least value, where far more do
-    than at any other.
+    """Return which readings (f, m) stand exactly at the greatest or the least value, if far more
+    readings do so than at any other value.
 
-    A rail is a value in the outer half of the range of magnitudes that at least MIN_TIES readings
-    share, and TIES_PER_USUAL times as many as share a usual value of that half; equal readings of a
-    noiseless or coarsely digitised frame are no rail.
+    A rail is a value in the outer half of the range of magnitudes that is shared by at least
+    MIN_TIES readings, and by TIES_PER_USUAL times as many readings as an average value in that
+    half. Equal readings in a frame without noise, or with coarse digits, do not count as a rail.
     """
     found = np.zeros(frames.shape, dtype=bool)
     top = float(np.abs(frames).max(initial=0.0))
@@ -81,8 +81,8 @@ def at_rail(frames: FloatArray) -> BoolArray:
 
 
 def _stuck(quiet: FloatArray) -> BoolArray:
-    """Channels (m,) without any change over at least MIN_QUIET quiet frames, where most channels
-    do change."""
+    """Return the rows (m,) that do not change over at least MIN_QUIET untouched frames, provided
+    that most rows do change."""
     if len(quiet) < MIN_QUIET:
         return np.zeros(quiet.shape[1], dtype=bool)
     still = np.ptp(np.nan_to_num(quiet), axis=0) == 0

@@ -1,5 +1,5 @@
-"""The examination: every check in its turn, each relying only on channels that the earlier ones
-left trusted."""
+"""The examination: it runs the checks in order. Each check uses only rows that the earlier checks
+still trust."""
 
 from dataclasses import replace
 
@@ -23,19 +23,19 @@ from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import homogeneous
 
 RENUMBER_FIRST = (
-    "how to repair what has an electrode's or a channel's number here: renumber by import first,"
-    " then examine again"
+    "how to repair findings that name an electrode or a channel: renumber by import first, then"
+    " examine again"
 )
 
 
 def examine(subject: Subject) -> DoctorReport:
-    """What is wrong with ``subject``, with evidence and remedy; see docs/guide/import-and-doctor.md
-    for every check."""
+    """Return what is wrong with ``subject``, with evidence and remedies;
+    docs/guide/import-and-doctor.md describes every check."""
     return examine_case(subject)[0]
 
 
 def examine_case(subject: Subject) -> tuple[DoctorReport, Case]:
-    """As ``examine``, with the case as the checks left it (for the picture)."""
+    """Return the report of ``examine``, and the case as the checks left it, for the picture."""
     cases: list[Case] = []
     finite = CheckOutcome()
     for _, frames in subject.readings:
@@ -54,7 +54,7 @@ def examine_case(subject: Subject) -> tuple[DoctorReport, Case]:
     case, clipping = check_clipping(case)
     case, wiring = check_wiring(case)
     if case.joined:
-        text = "gains, single channels and numbering: part the joined electrodes first"
+        text = "gains, single channels and numbering: separate the joined electrodes first"
         outcomes += [sign, clipping, wiring, check_reciprocity(case), check_noise(case)]
         outcomes.append(CheckOutcome(untold=(text,)))
         return _report(subject, case, outcomes), case
@@ -89,8 +89,8 @@ def _report(subject: Subject, case: Case, outcomes: list[CheckOutcome]) -> Docto
     frames = case.frames
     described = (
         f"{frames.n_frames} frame(s) of {len(case.rows)} channels,"
-        f" {len(frames.reference_voltage_v)} quiet, {frames.protocol.n_electrodes} electrodes; held"
-        f" against {case.prediction.source}"
+        f" {len(frames.reference_voltage_v)} quiet, {frames.protocol.n_electrodes} electrodes;"
+        f" compared with {case.prediction.source}"
     )
     measured: dict[str, object] = {}
     for outcome in outcomes:

@@ -1,4 +1,4 @@
-"""Are all voltages numbers, and is there a signal at all?"""
+"""Check that all voltages are finite numbers, and that there is a signal."""
 
 from dataclasses import replace
 
@@ -10,8 +10,8 @@ from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 
 
 def check_finite(case: Case) -> tuple[Case, CheckOutcome]:
-    """NaN and Inf by channel and frame, and a reference that is all zero; such channels are no
-    longer trusted."""
+    """Report NaN and Inf by row and frame, and a reference that is zero everywhere; affected rows
+    lose their trust."""
     quiet, frames = case.frames.reference_voltage_v, case.frames.voltage_v
     bad_quiet, bad = ~np.isfinite(quiet), ~np.isfinite(frames)
     channels = np.flatnonzero(bad_quiet.any(axis=0) | bad.any(axis=0))

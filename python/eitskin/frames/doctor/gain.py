@@ -1,5 +1,4 @@
-"""The gain of each channel: how the reference compares with the homogeneous frame, by channel and
-by pair."""
+"""The gain of each row: the reference compared with the homogeneous frame, by row and by pair."""
 
 from dataclasses import replace
 from typing import Any
@@ -37,23 +36,23 @@ LEVEL_FAULT = 0.1
 
 
 def channel_gains(case: Case) -> tuple[FloatArray, BoolArray]:
-    """Reference over expected (m,), and which channels (m,) are trusted and strong enough for it to
-    mean anything."""
+    """Return reference over expected (m,), and which rows (m,) are trusted and strong enough for
+    this ratio to have a meaning."""
     expected = case.expected()
     strong = case.trusted & (np.abs(expected) > WEAK_PER_RMS * rms(expected))
     return np.divide(case.reference, expected, out=np.ones_like(expected), where=strong), strong
 
 
 def outliers(case: Case) -> BoolArray:
-    """Channels (m,) whose gain is off by more than OUTLIER, or OUTLIER_SPREADS times the usual
-    spread."""
+    """Return the rows (m,) whose gain differs from 1 by more than OUTLIER and more than
+    OUTLIER_SPREADS times the usual spread."""
     gain, strong = channel_gains(case)
     limit = max(OUTLIER, OUTLIER_SPREADS * robust_spread(gain[strong]))
     return np.asarray(strong & (np.abs(gain - 1) > limit))
 
 
 def check_resemblance(case: Case) -> CheckOutcome:
-    """Whether the reference looks like a homogeneous skin at all."""
+    """Check whether the reference resembles a homogeneous skin at all."""
     measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
     size = np.abs(predicted)
     if size.size < MIN_CHANNELS or np.ptp(size) <= SAME * size.max():
@@ -67,19 +66,20 @@ def check_resemblance(case: Case) -> CheckOutcome:
     finding = Finding(
         "unlike-a-homogeneous-skin",
         FAULT,
-        "the reference does not look like a homogeneous skin in any order known here: another"
-        " protocol, outline or wiring, or the frame was not quiet; if the source has a table of its"
-        " rows, import it with that; if it stays so, teach the skin from 20 presses (eitskin teach"
-        " record)",
+        "the reference does not look like a homogeneous skin in any known order: another protocol,"
+        " outline or wiring, or the skin was touched; if the source has a table of its rows, import"
+        " it with that table; if this finding remains, teach the skin from 20 presses (eitskin"
+        " teach record)",
         {"correlation": round(reached, 4), "least": FOREIGN_BELOW},
     )
     return CheckOutcome((finding,), measured=summary)
 
 
 def check_gain(case: Case) -> tuple[Case, CheckOutcome]:
-    """Single channels that are off, drive or measuring pairs that are off, and the spread of all.
+    """Report single rows with a wrong gain, drive or measuring pairs with a wrong gain, and the
+    spread over all rows.
 
-    The gain of a channel is its reference over the expected homogeneous value; the spread is 1.4826
+    The gain of a row is its reference over the expected homogeneous value; the spread is 1.4826
     times the median distance from the median.
     """
     gain, strong = channel_gains(case)
@@ -104,7 +104,7 @@ def check_gain(case: Case) -> tuple[Case, CheckOutcome]:
     if spread >= SPREAD_NOTE and strong.sum() >= GROUP:
         fault = spread >= SPREAD_FAULT
         text = (
-            f"channels have gains of their own, spread {100 * spread:.1f} %: normalised differences"
+            f"channels have different gains, spread {100 * spread:.1f} %: normalised differences"
             f" {'are needed' if fault else 'may help'}"
         )
         limits = {"note_from": SPREAD_NOTE, "fault_from": SPREAD_FAULT}
@@ -117,7 +117,8 @@ def check_gain(case: Case) -> tuple[Case, CheckOutcome]:
 
 
 def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
-    """Whether the numbers can be volts, where the skin's conductivity and the current are known."""
+    """Check whether the numbers can be volts, if the skin's conductivity and the current are
+    known."""
     if case.skin is None:
         return CheckOutcome(untold=("the unit: it needs a skin with its conductivity (--skin)",))
     if not case.trusted.any():
@@ -131,17 +132,17 @@ def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
     measured = {"reference_per_predicted": float(f"{ratio:.4g}")}
     if 1 / UNIT_OFF < ratio < UNIT_OFF:
         return CheckOutcome(measured=measured)
-    said = "the numbers are said to be volts" if unit_known else "the source's unit is not known"
+    unit = "the numbers are stated as volts" if unit_known else "the source's unit is not known"
     text = (
         f"the reference is {ratio:.3g} times what skin {case.skin.name!r} gives at "
-        f"{case.frames.protocol.current_a:g} A; {said}: check unit, gain, current and conductivity"
+        f"{case.frames.protocol.current_a:g} A; {unit}: check unit, gain, current and conductivity"
     )
     return CheckOutcome((Finding("unit", NOTE, text, measured, ""),), measured=measured)
 
 
 def check_level(case: Case) -> CheckOutcome:
-    """Whether all voltages are as high as what stands in for the skin makes them, whose size is
-    known: generator, current source and receiver together."""
+    """Check whether the voltages are as high as those of the stand-in for the skin, whose size is
+    known. This covers generator, current source and receiver together."""
     strong = channel_gains(case)[1]
     if not strong.any():
         return CheckOutcome()
@@ -159,10 +160,10 @@ def check_level(case: Case) -> CheckOutcome:
 
 
 def _pair_findings(case: Case, gain: FloatArray, strong: BoolArray, spread: float) -> list[Finding]:
-    """Drive and measuring pairs whose median gain is off while most of their channels agree about
-    it."""
+    """Report drive and measuring pairs whose median gain is wrong while most of their rows agree
+    about it."""
     findings = []
-    for name, said, columns in (("drive", "driven by", [0, 1]), ("measure", "measured by", [2, 3])):
+    for name, verb, columns in (("drive", "driven by", [0, 1]), ("measure", "measured by", [2, 3])):
         pairs = case.rows[:, columns]
         for pair in np.unique(pairs, axis=0):
             using = (pairs == pair).all(axis=1) & strong
@@ -178,13 +179,13 @@ def _pair_findings(case: Case, gain: FloatArray, strong: BoolArray, spread: floa
             kind, remedy = (FAULT, "--equalise") if fault else (NOTE, "")
             channels = numbers(np.flatnonzero(using))
             evidence = {"pair": numbers(pair), "gain": round(middle, 4), "channels": channels}
-            text = f"channels {said} pair {pair.tolist()} read {middle:.3g} of what the others do"
+            text = f"channels {verb} pair {pair.tolist()} read {middle:.3g} times what others read"
             findings.append(Finding(f"{name}-pair-gain", kind, text, evidence, remedy))
     return findings
 
 
 def _of_pairs(case: Case, findings: list[Finding]) -> BoolArray:
-    """The channels (m,) that pair findings explain already."""
+    """Return the rows (m,) that findings about pairs already explain."""
     explained: Any = np.zeros(len(case.rows), dtype=bool)
     for finding in findings:
         explained[finding.evidence["channels"]] = True

@@ -1,4 +1,5 @@
-"""How badly a predicted frame explains the reference, and which short circuit explains it best."""
+"""Measure how well a predicted frame explains the reference, and find the short circuit that
+explains it best."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -15,8 +16,8 @@ CONTACTS = (0.0, -0.35, -0.2, 0.2, 0.4)
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """Electrodes ``pair`` joined by a wire: the transfer matrix (n, n) in ohm with it, and the
-    ``misfit`` it leaves."""
+    """Two electrodes ``pair`` joined by a wire: the transfer matrix (n, n) in ohm with the wire,
+    and the ``misfit`` that remains."""
 
     pair: tuple[int, int]
     transfer_ohm: FloatArray
@@ -26,11 +27,11 @@ class Joined:
 def misfits(
     measured: FloatArray, predicted: FloatArray, use: BoolArray, magnitude: bool
 ) -> FloatArray:
-    """Relative rms (h,) of what the best multiple of each of ``predicted`` (h, m) leaves of
-    ``measured`` (m,).
+    """Return the relative rms (h,) of the residual when each of ``predicted`` (h, m) is scaled to
+    fit ``measured`` (m,).
 
-    Over ``use`` (m,), and the TRIMMED worst channels of a first fit left out of the second.
-    ``magnitude``: signs do not enter. 1 where nothing can be fitted.
+    Only rows in ``use`` (m,) count, and a second fit leaves out the TRIMMED worst rows of the
+    first. With ``magnitude`` signs are ignored. The result is 1 if nothing can be fitted.
     """
     y, p = measured[use], predicted[:, use]
     if magnitude:
@@ -51,16 +52,16 @@ def misfits(
 
 
 def misfit(case: Case, use: BoolArray, magnitude: bool) -> float:
-    """The misfit of the case's own prediction over the channels ``use`` (m,)."""
+    """Return the misfit of the case's own prediction over the rows in ``use`` (m,)."""
     return float(misfits(case.reference, case.predicted[None], use, magnitude)[0])
 
 
 def best_joined(case: Case, magnitude: bool) -> Joined:
-    """The two electrodes whose joining explains the reference best.
+    """Find the two electrodes whose short circuit explains the reference best.
 
     How far an electrode's own potential rises above its neighbours' depends on its width and
-    contact, which are not known well: several values are tried, CONTACTS times the median rise more
-    than predicted.
+    contact impedance, which are not well known. So several values are tried: the predicted one plus
+    CONTACTS times the median rise.
     """
     pairs = np.array(list(combinations(sorted(set(case.rows.ravel().tolist())), 2)))
     own = np.diag(case.transfer_ohm)

@@ -1,9 +1,9 @@
-"""Noise of each channel, SNR and drift, from the quiet frames.
+"""Noise of each row, SNR and drift, from the untouched frames.
 
-Noise of a channel: rms of the differences of successive quiet frames over sqrt(2), which slow drift
-does not enter. SNR = 20 log10(rms(V0) / sigma), V0 the mean quiet frame and sigma the rms of the
-noise over all channels. Drift: by how much the common gain of the frame, <V, V0> / <V0, V0>,
-changes along a straight line through all quiet frames.
+The noise of a row is the rms of the differences between successive untouched frames over sqrt(2),
+which slow drift does not affect. SNR = 20 log10(rms(V0) / sigma), where V0 is the mean untouched
+frame and sigma is the rms of the noise over all rows. Drift is the change of the common gain of the
+frame, <V, V0> / <V0, V0>, along a straight line through all untouched frames.
 """
 
 import numpy as np
@@ -25,12 +25,12 @@ DRIFT_SIGMAS = 6.0
 
 
 def channel_noise(quiet: FloatArray) -> FloatArray:
-    """Noise (m,) of each channel from quiet frames (k, m)."""
+    """Return the noise (m,) of each row from untouched frames (k, m)."""
     return np.asarray(np.sqrt((np.diff(quiet, axis=0) ** 2).mean(axis=0) / 2))
 
 
 def check_noise(case: Case) -> CheckOutcome:
-    """Noisy channels, a low SNR, drift."""
+    """Report noisy rows, a low SNR, and drift."""
     quiet = case.frames.reference_voltage_v
     quiet = quiet[np.isfinite(quiet[:, case.trusted]).all(axis=1)]
     if len(quiet) < MIN_QUIET:
@@ -85,7 +85,7 @@ def check_noise(case: Case) -> CheckOutcome:
 
 
 def _usual_noise(case: Case, noise: FloatArray) -> FloatArray:
-    """The median noise of channels as strong as each trusted one: strong channels may have more
+    """Return the median noise of rows as strong as each trusted row: strong rows may have more
     noise."""
     strength, usual = np.abs(case.predicted[case.trusted]), noise.copy()
     for group in strength_groups(strength, np.ones(len(noise), dtype=bool)):
@@ -94,8 +94,8 @@ def _usual_noise(case: Case, noise: FloatArray) -> FloatArray:
 
 
 def _drift(quiet: FloatArray, reference: FloatArray, sigma: float) -> tuple[float, float]:
-    """Change of the common gain along its fitted line over all quiet frames, and its standard
-    deviation by noise."""
+    """Return the change of the common gain along its fitted line over all untouched frames, and the
+    standard deviation of this change by noise."""
     gain = quiet @ reference / (reference @ reference)
     when = np.linspace(-0.5, 0.5, len(quiet))
     slope = float(when @ gain / (when @ when))
@@ -103,7 +103,8 @@ def _drift(quiet: FloatArray, reference: FloatArray, sigma: float) -> tuple[floa
 
 
 def _common_electrode(case: Case, channels: IntArray) -> int | None:
-    """The electrode that is in all of ``channels``, where those are most of its channels."""
+    """Return the electrode that is in all of ``channels``, if these are a large part of its
+    rows."""
     for electrode in range(case.n_electrodes):
         using = touching(case.rows, [electrode]) & case.trusted
         if using[channels].all() and len(channels) >= MAX_OF_ELECTRODE * np.count_nonzero(using):

@@ -1,9 +1,9 @@
-"""How the electrodes may be numbered, and what a quiet frame says about it where the skin has no
-symmetry.
+"""The possible numberings of the electrodes, and what an untouched frame shows about them on a skin
+without symmetry.
 
-On a round skin with even electrodes and a protocol that looks the same from every electrode, a
-quiet frame is the same for every rotation and for both directions; there this check says so, and
-only a touch tells (orientation.py).
+On a round skin with evenly spaced electrodes and a protocol that looks the same from every
+electrode, an untouched frame is the same for every rotation and both directions. This check then
+reports so, and only a touch decides (orientation.py).
 """
 
 from dataclasses import dataclass, replace
@@ -21,15 +21,15 @@ CLEARLY = 0.5
 LIKELY = 0.9
 SHOWN = 3
 ALL_ALIKE = (
-    "where electrode 0 is and which way the numbers run: a quiet frame of this symmetric skin and"
-    " protocol is the same for all of them"
+    "where electrode 0 is and in which direction the numbers run: on this symmetric skin, with this"
+    " protocol, a quiet frame is the same for all numberings"
 )
 
 
 @dataclass(frozen=True)
 class Numbering:
-    """Source electrode 0 is electrode ``rotate``, counting on goes down if ``mirror``; ``fit`` is 1
-    at best."""
+    """A numbering: source electrode 0 is electrode ``rotate``, and with ``mirror`` the numbers run
+    the other way. ``fit`` is at most 1."""
 
     rotate: int
     mirror: bool
@@ -37,12 +37,12 @@ class Numbering:
 
     @property
     def given(self) -> bool:
-        """Whether this is the numbering as it stands."""
+        """Return whether this is the numbering as given."""
         return not self.rotate and not self.mirror
 
     @property
     def option(self) -> str:
-        """The options of ``eitskin import`` for it."""
+        """The options of ``eitskin import`` that produce it."""
         return " ".join(
             [f"--rotate {self.rotate}"] * bool(self.rotate) + ["--mirror"] * self.mirror
         )
@@ -52,8 +52,8 @@ class Numbering:
 
 
 def ranked(fit: FloatArray) -> list[Numbering]:
-    """Numberings, best first, from their ``fit`` (2, n) by mirror and rotation; of equals the one
-    as given leads."""
+    """Return the numberings with the best first, from their ``fit`` (2, n) by mirror and rotation.
+    Among equals the given one comes first."""
     found = [Numbering(k, bool(m), float(fit[m, k])) for m in range(2) for k in range(fit.shape[1])]
     return sorted(
         found, key=lambda numbering: (-round(numbering.fit, 9), numbering.mirror, numbering.rotate)
@@ -61,8 +61,7 @@ def ranked(fit: FloatArray) -> list[Numbering]:
 
 
 def renumbered_frames(case: Case, transfer_ohm: FloatArray) -> FloatArray:
-    """Voltages (2, n, m) per ampere that each numbering, mirrored or not and rotated, would
-    give."""
+    """Return the voltages (2, n, m) per ampere for each numbering, mirrored or not and rotated."""
     n = case.n_electrodes
     maps = np.array(
         [[electrode_map(n, rotate, bool(mirror)) for rotate in range(n)] for mirror in range(2)]
@@ -71,16 +70,16 @@ def renumbered_frames(case: Case, transfer_ohm: FloatArray) -> FloatArray:
 
 
 def best_likeness(case: Case) -> float:
-    """Correlation of |reference| with |prediction|, in the numbering that reaches most."""
+    """Return the greatest correlation of |reference| with |prediction| over all numberings."""
     return float(_likeness(case, renumbered_frames(case, case.transfer_ohm)).max())
 
 
 def check_numbering(case: Case) -> tuple[Case, CheckOutcome]:
-    """Whether another numbering fits the quiet frame clearly better; the case comes back with its
-    rows renumbered.
+    """Check whether another numbering fits the untouched frame clearly better; the case is returned
+    with its rows renumbered.
 
-    Signs are left aside. Numberings that predict the same frame (correlation SAME_FRAME) cannot be
-    told apart.
+    Signs are ignored. Numberings that predict the same frame (correlation SAME_FRAME) cannot be
+    distinguished.
     """
     frames = renumbered_frames(case, case.transfer_ohm)
     alike = np.array(

@@ -1,5 +1,4 @@
-"""In which order do the channels stand, and with which sign? Each hypothesis is compared with the
-homogeneous frame."""
+"""The order and the sign of the rows. Each hypothesis is compared with the homogeneous frame."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -21,25 +20,24 @@ UNLIKE = 0.5
 
 @dataclass(frozen=True)
 class OrderChoice:
-    """The order whose magnitudes follow the prediction best, and what the others reach."""
+    """The order whose magnitudes follow the prediction best, and the outcome for the report."""
 
     best: int
     outcome: CheckOutcome
 
 
 def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -> OrderChoice:
-    """Compare one case an order, by the correlation of |reference| with |homogeneous prediction|
-    (signs left aside).
+    """Compare one case per order, by the correlation of |reference| with |homogeneous prediction|.
 
-    Where none reaches LIKELY, exchanged wires or a dead electrode may hide it: then what is reached
-    without those is compared. Another order than ``given`` is found where it is better by more than
-    BETTER_BY and at least LIKELY.
+    If no order reaches LIKELY, exchanged wires or a dead electrode may hide the right one; then the
+    correlations without these faults are compared. An order other than ``given`` is reported if its
+    correlation is at least LIKELY and better by more than BETTER_BY.
     """
-    said = orders.index(given) if given in orders else -1
+    own = orders.index(given) if given in orders else -1
     size = np.abs(cases[0].predicted)
-    if said >= 0 and np.ptp(size) <= SAME * size.max():
+    if own >= 0 and np.ptp(size) <= SAME * size.max():
         return OrderChoice(
-            said, CheckOutcome(untold=("the channel order: the protocol makes all channels alike",))
+            own, CheckOutcome(untold=("the channel order: the protocol makes all channels alike",))
         )
     reached = [likeness(case, allow_fault=False) for case in cases]
     if max(reached) < LIKELY:
@@ -49,9 +47,9 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
         name: round(value, 4) for name, value in zip(orders, reached, strict=True)
     }
     measured: dict[str, Any] = {"order_correlation": evidence}
-    if said >= 0 and (best == said or reached[best] < max(reached[said] + BETTER_BY, LIKELY)):
-        return OrderChoice(said, CheckOutcome(measured=measured))
-    why = "by their number" if said < 0 else "by correlation with the homogeneous frame"
+    if own >= 0 and (best == own or reached[best] < max(reached[own] + BETTER_BY, LIKELY)):
+        return OrderChoice(own, CheckOutcome(measured=measured))
+    why = "by their number" if own < 0 else "by correlation with the homogeneous frame"
     named = "the order given" if given == AS_GIVEN else f"{given}"
     finding = Finding(
         "order",
@@ -64,8 +62,8 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
 
 
 def check_frames(case: Case) -> CheckOutcome:
-    """Frames that are no small change of the reference: another quantity (imaginary parts, times),
-    or another unit."""
+    """Report frames that are not a small change of the reference: another quantity (imaginary
+    parts, times) or another unit."""
     reference = case.reference[case.trusted]
     frames = _finite_frames(case)[:, case.trusted]
     likeness = np.array([cosine(frame, reference) for frame in frames])
@@ -76,7 +74,7 @@ def check_frames(case: Case) -> CheckOutcome:
     finding = Finding(
         "frames-unlike-the-reference",
         FAULT,
-        f"{len(odd)} frame(s) are nothing like the reference, first {names[0]!r}: imaginary parts"
+        f"{len(odd)} frame(s) do not resemble the reference, first {names[0]!r}: imaginary parts"
         " or another quantity among the columns? Choose with --columns and --complex-part, or"
         " --voltage",
         {"frames": names, "cosine": [round(float(v), 4) for v in likeness[odd]]},
@@ -85,11 +83,12 @@ def check_frames(case: Case) -> CheckOutcome:
 
 
 def check_sign(case: Case) -> tuple[Case, CheckOutcome]:
-    """Reversed polarity, or magnitudes only; the case comes back with the signs repaired.
+    """Report reversed polarity, or magnitudes without sign; the case is returned with its signs
+    repaired.
 
-    Where the homogeneous frame has both signs, magnitudes show by having one. Where it has only one
-    (adjacent patterns), data of the other sign are reversed, or magnitudes; only a channel that
-    crosses zero tells which.
+    If the homogeneous frame has both signs, data with only one sign are magnitudes. If it has only
+    one sign (adjacent patterns), data of the other sign are either reversed or magnitudes, and only
+    a row that crosses zero decides.
     """
     measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
     level = rms(measured)
@@ -134,7 +133,8 @@ def check_sign(case: Case) -> tuple[Case, CheckOutcome]:
 
 
 def check_flips(case: Case) -> tuple[Case, CheckOutcome]:
-    """Single channels of the wrong sign, where the prediction is above a fifth of its rms."""
+    """Report single rows with the wrong sign, among those whose prediction is above a fifth of its
+    rms."""
     predicted, expected = case.predicted, case.expected()
     ratio = np.divide(case.reference, expected, out=np.ones_like(expected), where=expected != 0)
     wrong = case.trusted & (np.abs(predicted) > 0.2 * rms(predicted)) & (ratio < -0.5)
@@ -158,7 +158,8 @@ def _finite_frames(case: Case) -> FloatArray:
 
 
 def _whole_pairs(case: Case, wrong: np.ndarray[Any, Any], columns: tuple[int, int]) -> set[str]:
-    """Names of the drive (or measuring) pairs whose every trusted channel is ``wrong``."""
+    """Return the names of drive (or measuring) pairs of which nearly all trusted rows are
+    ``wrong``."""
     what = "drive" if columns[0] == 0 else "measuring pair"
     pairs = case.rows[:, columns]
     found = set()
@@ -170,7 +171,7 @@ def _whole_pairs(case: Case, wrong: np.ndarray[Any, Any], columns: tuple[int, in
 
 
 def _times(case: Case, sign: FloatArray | float, magnitude: bool = False) -> Case:
-    """``case`` with its voltages, or their magnitudes, times ``sign`` (m,)."""
+    """Return ``case`` with its voltages, or their magnitudes, multiplied by ``sign`` (m,)."""
     quiet, voltage = case.frames.reference_voltage_v, case.frames.voltage_v
     if magnitude:
         quiet, voltage = np.abs(quiet), np.abs(voltage)
@@ -179,5 +180,5 @@ def _times(case: Case, sign: FloatArray | float, magnitude: bool = False) -> Cas
 
 
 def signed_as_predicted(case: Case) -> Case:
-    """The case with magnitudes of its voltages under the signs of the prediction."""
+    """Return the case with the magnitudes of its voltages and the signs of the prediction."""
     return _times(case, np.where(case.predicted < 0, -1.0, 1.0), magnitude=True)

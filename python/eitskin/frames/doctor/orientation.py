@@ -1,7 +1,7 @@
-"""Where electrode 0 is and which way the numbers run, told by touches at known places.
+"""Find where electrode 0 is and in which direction the numbers run, from touches at known places.
 
-One touch alone leaves a mirror image about its own diameter; two that are no mirror image of each
-other leave nothing.
+A single touch leaves the mirror image about its own diameter open; two touches that are not mirror
+images of each other decide.
 """
 
 import numpy as np
@@ -22,8 +22,8 @@ SHOWN = 3
 
 
 def check_orientation(case: Case, untold: tuple[str, ...]) -> CheckOutcome:
-    """Hold the changes by known touches against every numbering; ``untold`` is what the quiet frame
-    could not tell."""
+    """Compare the changes by known touches with those of every numbering. ``untold`` are the
+    questions that the untouched frame left open."""
     measured, transfers = _changes(case)
     if not measured:
         why = "the known touches have no sign or no change"
@@ -57,19 +57,19 @@ def check_orientation(case: Case, untold: tuple[str, ...]) -> CheckOutcome:
         " given"
     )
     if len(rivals) > 1:
-        text += f"; {rivals[1]} fits nearly as well, a second touch would tell"
+        text += f"; {rivals[1]} fits nearly as well, and a second touch would decide"
     finding = Finding("numbering", FAULT, text, evidence, best.option)
     return CheckOutcome((finding,), measured=summary)
 
 
 def _changes(case: Case) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Of each frame with touches of known sign the measured change (m,) and the predicted transfer
-    change (n, n)."""
+    """Return the measured change (m,) and the predicted change of the transfer matrix (n, n) for
+    each frame with touches of known sign."""
     frames, skin = case.frames, case.skin
     at_mm, radius_mm, sign = frames.touch_xy_mm, frames.touch_radius_mm, frames.touch_sign
     if frames.touch_frame is None or skin is None:
         return [], []
-    assert at_mm is not None  # Frames has all of them where it has touch_frame
+    assert at_mm is not None  # Frames has all of these if it has touch_frame
     assert radius_mm is not None
     assert sign is not None
     measured, transfers = [], []
@@ -86,8 +86,8 @@ def _changes(case: Case) -> tuple[list[FloatArray], list[FloatArray]]:
 def _fits(
     case: Case, measured: list[FloatArray], transfers: list[FloatArray], weight: FloatArray
 ) -> FloatArray:
-    """Mean cosine (2, n) of the measured changes with those that each numbering predicts, channels
-    times ``weight``."""
+    """Return the mean cosine (2, n) of the measured changes with those that each numbering
+    predicts, rows multiplied by ``weight``."""
     use = case.trusted
     total = np.zeros((2, case.n_electrodes))
     for change, transfer in zip(measured, transfers, strict=True):
@@ -107,8 +107,8 @@ def _also(given: Numbering, rivals: list[Numbering]) -> tuple[str, ...]:
 
 
 def _drowned(case: Case, measured: list[FloatArray], weight: FloatArray) -> bool:
-    """Whether the weighted changes are less than AUDIBLE times the weighted noise of one frame,
-    where that is known."""
+    """Return whether the weighted changes are below AUDIBLE times the weighted noise of one frame;
+    False if the noise is unknown."""
     quiet = case.frames.reference_voltage_v
     if len(quiet) < MIN_QUIET:
         return False

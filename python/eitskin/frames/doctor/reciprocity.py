@@ -1,5 +1,5 @@
-"""Reciprocity: exchanging the drive and the measuring pair must not change the voltage, whatever is
-inside the skin."""
+"""Reciprocity: if the drive and the measuring pair are exchanged, the voltage must stay the same,
+whatever is inside the skin."""
 
 from collections.abc import Iterable
 
@@ -21,10 +21,10 @@ WORST = 5
 
 
 def check_reciprocity(case: Case) -> CheckOutcome:
-    """Reciprocity error of each pair |Vi - s Vj| / max(mean(|Vi|, |Vj|), 0.1 rms), and of all:
-    rms(Vi - s Vj) / rms(V).
+    """Report the reciprocity error of each pair, |Vi - s Vj| / max(mean(|Vi|, |Vj|), 0.1 rms), and
+    of all, rms(Vi - s Vj) / rms(V).
 
-    The channel of a bad pair whose gain is farther from 1 is named, where the prediction can tell.
+    In a bad pair the row whose gain is further from 1 is named as wrong.
     """
     pairs = case.frames.protocol.reciprocal_pairs()
     both = (

@@ -1,5 +1,5 @@
-"""Which options of ``eitskin import`` repair bad channels, and how the remedies of several findings
-become one."""
+"""The options of ``eitskin import`` that repair bad rows, and how the remedies of several findings
+are combined."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -11,8 +11,8 @@ CHANNEL_LISTS = ("--flip-channels", "--impute-channels", "--drop-channels", "--d
 
 
 def channel_remedy(case: Case, channels: Any) -> str:
-    """Fill ``channels`` from their reciprocals where those are trusted, and leave out the
-    others."""
+    """Return the options that fill ``channels`` from their reciprocal rows if those are trusted,
+    and leave out the others."""
     bad = set(numbers(channels))
     partner = partners(case.rows, case.n_electrodes)
     fill = sorted(
@@ -23,13 +23,14 @@ def channel_remedy(case: Case, channels: Any) -> str:
 
 
 def names_numbers(remedy: str) -> bool:
-    """Whether ``remedy`` names channels or electrodes, which another numbering would change."""
+    """Return whether ``remedy`` names channels or electrodes, whose numbers another numbering would
+    change."""
     return any(option in remedy for option in (*CHANNEL_LISTS, "--swap"))
 
 
 def combined_remedy(case: Case, remedies: Iterable[str]) -> str:
-    """One set of options from those of several findings: lists are united, and no channel is filled
-    from a bad one."""
+    """Return one set of options from those of several findings. Lists are merged, and no row is
+    filled from a bad one."""
     lists: dict[str, set[int]] = {option: set() for option in CHANNEL_LISTS}
     others: list[str] = []
     for remedy in remedies:
@@ -39,8 +40,8 @@ def combined_remedy(case: Case, remedies: Iterable[str]) -> str:
             value = words.pop(0) if words and not words[0].startswith("--") else ""
             if option in lists:
                 lists[option] |= {int(number) for number in value.split(",")}
-            elif (said := f"{option} {value}".strip()) not in others:
-                others.append(said)
+            elif (given := f"{option} {value}".strip()) not in others:
+                others.append(given)
     gone = {
         row
         for row, electrodes in enumerate(case.rows.tolist())

@@ -1,5 +1,5 @@
-"""What the doctor says: findings with evidence and remedy, what could not be told, and the numbers
-measured."""
+"""The doctor's report: findings with evidence and remedies, the questions that stayed open, and the
+measured numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,11 +16,11 @@ SHOWN = 8
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found. ``name`` is stable for programs; ``severity`` FAULT must be repaired, NOTE
-    need not.
+    """One finding. ``name`` is stable for programs. ``severity`` is FAULT if it must be repaired,
+    otherwise NOTE.
 
-    ``evidence`` holds the numbers that it rests on, ``repair`` the options of ``eitskin import``
-    that repair it ("" where only the hardware can be repaired).
+    ``evidence`` holds the numbers that support it. ``repair`` holds the options of ``eitskin
+    import`` that repair it, or is empty if only the hardware can be repaired.
     """
 
     name: str
@@ -32,8 +32,8 @@ class Finding:
 
 @dataclass(frozen=True)
 class CheckOutcome:
-    """What one check returns: ``findings``, ``untold`` what it could not tell and why, ``measured``
-    numbers by name."""
+    """The result of one check: its ``findings``; ``untold``, the questions that it could not
+    decide, with reasons; and ``measured``, numbers by name."""
 
     findings: tuple[Finding, ...] = ()
     untold: tuple[str, ...] = ()
@@ -42,9 +42,10 @@ class CheckOutcome:
 
 @dataclass(frozen=True)
 class DoctorReport:
-    """The whole examination of ``source``; ``subject`` says in words what was examined.
+    """The report on ``source``; ``subject`` describes what was examined.
 
-    ``repair``: the options of ``eitskin import`` that together repair all that can be repaired.
+    ``repair`` holds the options of ``eitskin import`` that together repair everything that can be
+    repaired.
     """
 
     source: str
@@ -56,16 +57,16 @@ class DoctorReport:
 
     @property
     def healthy(self) -> bool:
-        """Whether nothing must be repaired."""
+        """Return whether there is no fault."""
         return not any(finding.severity == FAULT for finding in self.findings)
 
     @property
     def exit_code(self) -> int:
-        """0 where healthy, else EXIT_FAULT."""
+        """The exit code of the command: 0 if healthy, otherwise EXIT_FAULT."""
         return 0 if self.healthy else EXIT_FAULT
 
     def as_table(self) -> dict[str, Any]:
-        """The report as JSON values; a number that is not finite becomes null."""
+        """Return the report as JSON values; a number that is not finite becomes null."""
         return {
             "source": self.source,
             "subject": self.subject,
@@ -79,6 +80,7 @@ class DoctorReport:
         }
 
     def lines(self) -> list[str]:
+        """Return the report as lines of text."""
         lines = [f"{self.source}: {self.subject}"]
         for finding in self.findings:
             lines.append(f"  {finding.severity.upper():5} {finding.name}: {finding.text}")

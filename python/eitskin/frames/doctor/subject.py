@@ -1,5 +1,5 @@
-"""What the doctor examines: a frames file, or a source read under each order that its channels
-could stand in."""
+"""The subject of the examination: a frames file, or a source read in each order that its channels
+could have."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,12 +21,12 @@ AS_GIVEN = "as given"
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """``readings``: (order, frames), the channels in the protocol's order if the source stands in
-    that order.
+    """The frames that the doctor examines. ``readings`` are pairs (order, frames): the rows in the
+    protocol's order, if the source has this order.
 
-    ``stand_in``: what was measured in place of the skin, as a ring of resistors. ``given``: the
-    order that was said. ``remarks``: what had to be assumed to read it. ``unit_known``: whether the
-    numbers are said to be volts.
+    ``stand_in`` describes what was measured in place of the skin, such as a ring of resistors.
+    ``given`` is the stated order. ``remarks`` are the assumptions that were needed to read the
+    source. ``unit_known`` tells whether the numbers are stated as volts.
     """
 
     source: str
@@ -39,8 +39,8 @@ class Subject:
 
 
 def subject_from_frames(frames: Frames, skin: Skin | None, source: str = "frames") -> Subject:
-    """``frames`` as they are, and as they would be if their channels really stood in rotating
-    order."""
+    """Return the subject with ``frames`` as given, and as they would be if their rows were really
+    in rotating order."""
     readings = [(AS_GIVEN, frames)]
     wanted = np.asarray(frames.protocol.drive_measure, dtype=np.int64)
     rotating = source_table("rotating", frames.protocol)
@@ -63,10 +63,11 @@ def subject_from_source(
     skin: Skin | None,
     n_electrodes: int | None = None,
 ) -> Subject:
-    """Any file that ``import`` reads, repaired as ``options`` say, and a frames file as
-    ``load_frames`` reads it.
+    """Return the subject for any file that ``import`` reads, repaired as ``options`` say; a frames
+    file without options is read by ``load_frames``.
 
-    Unlike import, NaN and Inf pass, and where no quiet frames are named the first frame is taken.
+    Unlike import, NaN and Inf are accepted, and if no untouched frames are named, the first frame
+    is used as one.
     """
     if is_frames_file(path) and options == ImportOptions():
         return subject_from_frames(load_frames(path, allow_nonfinite=True), skin, str(path))

@@ -1,9 +1,10 @@
-"""Exchanged wires: which renaming of electrodes makes the reference look like a homogeneous frame?
+"""Exchanged wires: find the renaming of electrodes that makes the reference look like a homogeneous
+frame.
 
-Exchanges are tried pair by pair by the misfit of magnitudes, the best one kept, again and again.
-The whole is accepted only if it leaves little, at most half of what there was, and less than any
-short circuit leaves. Three electrodes in a ring (each in the place of the next) may be too far from
-the start for this search.
+Exchanges of two electrodes are tried by the misfit of magnitudes, and the best one is kept,
+repeatedly. The result is accepted only if its misfit is small, at most half of the initial one, and
+less than that of any short circuit. Three electrodes in a ring (each in the place of the next) may
+be too far from the start for this search.
 """
 
 from dataclasses import dataclass, replace
@@ -27,7 +28,7 @@ MAX_SWAPS = 6
 
 @dataclass(frozen=True)
 class ElectrodeSwap:
-    """``pairs`` of electrodes exchanged one after the other, and the misfit ``before`` and
+    """``pairs`` of electrodes exchanged one after the other, with the misfit ``before`` and
     ``after``."""
 
     pairs: tuple[tuple[int, int], ...]
@@ -36,12 +37,12 @@ class ElectrodeSwap:
 
     @property
     def convincing(self) -> bool:
-        """Whether the exchange explains the frame."""
+        """Return whether the exchange explains the frame."""
         return bool(self.pairs) and self.after <= GOOD and self.after * BETTER_TIMES <= self.before
 
 
 def best_exchange(case: Case) -> ElectrodeSwap:
-    """The exchange that greedy search finds for ``case``; signs do not enter."""
+    """Find the exchange for ``case`` by greedy search; signs are ignored."""
 
     n, use = case.n_electrodes, case.trusted
     tried = np.array(list(combinations(sorted(set(case.rows.ravel().tolist())), 2)))
@@ -62,7 +63,7 @@ def best_exchange(case: Case) -> ElectrodeSwap:
 
 
 def check_swaps(case: Case) -> tuple[Case, CheckOutcome]:
-    """Name exchanged electrodes; the case comes back with its rows renamed."""
+    """Report exchanged electrodes; the case is returned with its rows renamed."""
     exchange = best_exchange(case)
     if not exchange.convincing or best_joined(case, magnitude=True).misfit < exchange.after:
         return case, CheckOutcome()
@@ -82,15 +83,15 @@ def check_swaps(case: Case) -> tuple[Case, CheckOutcome]:
 
 
 def renamed(case: Case, exchange: ElectrodeSwap) -> Case:
-    """The case with its rows named as after ``exchange``."""
+    """Return the case with its rows renamed by ``exchange``."""
     return replace(case, rows=relabel(case.rows, swap_map(case.n_electrodes, exchange.pairs)))
 
 
 def likeness(case: Case, *, allow_fault: bool) -> float:
-    """Correlation of |reference| with |prediction|, in any numbering.
+    """Return the correlation of |reference| with |prediction| in the best numbering.
 
-    With ``allow_fault`` the best that is reached after undoing a convincing exchange, or without
-    any one electrode.
+    With ``allow_fault`` it is the best correlation after a convincing exchange is undone, or
+    without any one electrode.
     """
     if not allow_fault:
         return best_likeness(case)

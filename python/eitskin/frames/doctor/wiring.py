@@ -1,9 +1,8 @@
-"""Electrodes that are dead or joined: every such hypothesis predicts a frame, and the best one is
-named.
+"""Dead or joined electrodes: each hypothesis predicts a frame, and the best one is reported.
 
-Joined electrodes: the transfer matrix with the wire in it. A dead electrode: nearly all channels
-that drive by it, or that measure by it, stand out or are silent, and all channels without it are as
-if nothing had happened.
+For joined electrodes the wire is added to the transfer matrix. An electrode is dead if nearly all
+rows that drive with it, or nearly all that measure with it, stand out or are silent, while all rows
+without it are unaffected.
 """
 
 from dataclasses import dataclass, replace
@@ -32,18 +31,17 @@ MAX_FAULTS = 4
 
 @dataclass(frozen=True)
 class Dead:
-    """``electrodes`` taken for dead, and the misfit that the channels without them are left
-    with."""
+    """Electrodes assumed dead, and the misfit of the rows without them."""
 
     electrodes: tuple[int, ...]
     misfit: float
 
 
 def check_wiring(case: Case) -> tuple[Case, CheckOutcome]:
-    """Name faults while one explains the channels that stand out: dead electrodes, or one short
+    """Report faults as long as one explains the rows that stand out: dead electrodes, or one short
     circuit.
 
-    Nothing more is sought once a short circuit is found: its frame is known only roughly.
+    The search ends once a short circuit is found, because its frame is predicted only roughly.
     """
     findings: list[Finding] = []
     while len(findings) < MAX_FAULTS and (
@@ -66,7 +64,8 @@ def check_wiring(case: Case) -> tuple[Case, CheckOutcome]:
 
 
 def check_lost(case: Case) -> CheckOutcome:
-    """Electrodes that drive in the quiet frames, but no longer in some of the others."""
+    """Report electrodes that drive in the untouched frames but stop driving in some of the
+    others."""
     gain, strong = channel_gains(case)
     usable = strong & (np.abs(gain) > LOST)
     findings = []
@@ -91,7 +90,8 @@ def check_lost(case: Case) -> CheckOutcome:
 
 
 def _best_dead(case: Case) -> Dead | None:
-    """The fewest suspects without which the other channels are well explained: one, or two."""
+    """Return the smallest set of suspects, one or two, without which the other rows are well
+    explained."""
     suspects = _suspects(case)
     sets: list[tuple[int, ...]] = [(e,) for e in suspects]
     if len(suspects) <= MAX_SUSPECTS:
@@ -113,10 +113,10 @@ def _suspects(case: Case) -> list[int]:
 
 
 def _sides_off(case: Case, electrode: int) -> dict[str, float]:
-    """Of "driving" and "measuring" those by which nearly all channels of ``electrode`` stand out,
-    with their gain.
+    """Return which of "driving" and "measuring" are affected, with the gain: those in which nearly
+    all rows of ``electrode`` stand out.
 
-    They stand out from like channels, or, where too many of those are dead, by being nearly silent.
+    They stand out from similar rows; or, if too many of those are dead, by being nearly silent.
     """
     off, (gain, _), strength = outliers(case), channel_gains(case), _strength(case)
     sides = {}
@@ -133,8 +133,8 @@ def _sides_off(case: Case, electrode: int) -> dict[str, float]:
 
 
 def _strength(case: Case) -> FloatArray:
-    """|Reference| per |prediction| (m,), relative to its upper quartile: robust while fewer than
-    half are dead."""
+    """Return |reference| per |prediction| (m,), relative to its upper quartile, which is robust
+    while fewer than half of the rows are dead."""
     size = np.abs(case.predicted)
     ratio = np.divide(np.abs(case.reference), size, out=np.ones_like(size), where=size > 0)
     usual = float(np.quantile(ratio[case.trusted], 0.75)) if case.trusted.any() else 0.0
@@ -160,7 +160,7 @@ def _without(case: Case, dead: Dead, before: float) -> tuple[Case, list[Finding]
 def _with_joined(case: Case, joined: Joined, before: float) -> tuple[Case, Finding]:
     i, j = joined.pair
     text = (
-        f"electrodes {i} and {j} (from 0) are joined by a short circuit: part them; no import"
+        f"electrodes {i} and {j} (from 0) are joined by a short circuit: separate them; no import"
         " option can undo this"
     )
     evidence = {

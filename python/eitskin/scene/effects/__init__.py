@@ -1,2 +1,2 @@
-"""The built-in effects, one a file; a file is imported only when a scene names its effect
+"""The built-in effects, one per file; a file is imported only when a scene names its effect
 (``scene/registry.py``)."""

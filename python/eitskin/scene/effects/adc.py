@@ -1,10 +1,10 @@
-"""The converter: voltages become whole numbers of steps, and what is out of range the first or last
-of them.
+"""The converter: voltages become integer steps, and values out of range become the first or the
+last step.
 
-Mid-tread, two's complement: B bits over +-range have the step LSB = 2 range / 2^B, codes from
--2^(B-1) to 2^(B-1) - 1. The error is uniform over a step, with the variance LSB^2 / 12, wherever
-the signal moves over many steps (Bennett, Bell Syst. Tech. J. 27, 1948). What goes out is code
-times LSB, in V.
+It is mid-tread, two's complement: B bits over +-range have the step LSB = 2 range / 2^B and codes
+from -2^(B-1) to 2^(B-1) - 1. The error is uniform over a step, with the variance LSB^2 / 12, if the
+signal moves over many steps (Bennett, Bell Syst. Tech. J. 27, 1948). The result is code times LSB,
+in V.
 """
 
 from dataclasses import dataclass
@@ -23,11 +23,11 @@ SUMMARY = "Voltages are rounded to the converter's steps."
 
 @dataclass(frozen=True)
 class Parameters:
-    """Resolution, and the range in one of two ways; a headroom of 1.25 without either."""
+    """The resolution, and the range as a voltage or as a headroom (default 1.25)."""
 
     bits: int = parameter(12, "bit", "resolution", low=1, high=32)
     range_v: float | None = parameter(
-        None, "V", "the converter spans +- this", low=0, open_low=True
+        None, "V", "half the span of the converter", low=0, open_low=True
     )
     headroom: float | None = parameter(
         None, "1", "range / largest untouched voltage", low=0, high=1e6, open_low=True
@@ -39,13 +39,13 @@ class Parameters:
 
 
 def codes(v: Voltages, lsb_v: float, bits: int) -> Voltages:
-    """Whole numbers (m,), as float64, from -2^(bits - 1) to 2^(bits - 1) - 1."""
+    """Return integers (m,), as float64, from -2^(bits - 1) to 2^(bits - 1) - 1."""
     half = 2.0 ** (bits - 1)
     return np.asarray(np.clip(np.round(v / lsb_v), -half, half - 1))
 
 
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
-    """Rounds every row."""
+    """Return the step that rounds every row."""
     span_v = session.limit_v(parameters.range_v, parameters.headroom)
     lsb_v = 2 * span_v / 2**parameters.bits
 

@@ -1,9 +1,9 @@
-"""A sheet that is not even: a smooth random pattern of conductivity, its mean over the area kept.
+"""An uneven skin: a smooth random pattern of conductivity whose mean over the area is kept.
 
 The pattern is a Gaussian random field f of unit variance (``scene/random_field.py``). With q = ln(1
-+ spread^2) the conductivity is multiplied by exp(sqrt(q) f), log-normal with a relative deviation
-of ``spread``, so always above 0; dividing by its mean over the area makes the mean exactly what the
-skin's description says.
++ spread^2) the conductivity is multiplied by exp(sqrt(q) f), which is log-normal with a relative
+deviation of ``spread``, so always above 0. Division by its mean over the area makes the mean
+exactly that of the skin's description.
 """
 
 from dataclasses import dataclass
@@ -23,27 +23,27 @@ SUMMARY = "The skin's conductivity varies smoothly from place to place."
 
 @dataclass(frozen=True)
 class Parameters:
-    """How strong and how smooth."""
+    """The strength and the smoothness of the pattern."""
 
     spread: float = parameter(
         0.1, "1", "relative standard deviation of the conductivity", low=0, high=2
     )
     length_mm: float = parameter(
-        30.0, "mm", "distance over which the pattern is alike", low=0, open_low=True
+        30.0, "mm", "correlation length of the pattern", low=0, open_low=True
     )
 
 
 def pattern(
     places_mm: FloatArray, areas: FloatArray, parameters: Parameters, draw: np.random.Generator
 ) -> FloatArray:
-    """Factors (k,) above 0 whose mean weighted by ``areas`` (k,) is 1."""
+    """Return factors (k,) above 0 whose mean weighted by ``areas`` (k,) is 1."""
     field = random_field(places_mm, parameters.length_mm, draw)
     factors = np.exp(sqrt(log(1 + parameters.spread**2)) * field)
     return np.asarray(factors / np.average(factors, weights=areas))
 
 
 def make(parameters: Parameters, session: EffectSession) -> MaterialStep:
-    """One factor an element, drawn once."""
+    """Return the step with one factor per element, drawn once."""
     mesh = session.mesh
     factors = pattern(mesh.centroids_mm(), mesh.areas_mm2, parameters, session.stream(NAME))
 

@@ -1,8 +1,9 @@
-"""Electrodes joined by a resistor: a solder bridge, a drop of gel on the rim, wires that touch.
+"""Electrodes joined by a resistor, for example a solder bridge, a drop of gel on the rim, or wires
+that touch.
 
-A resistor R between electrodes i and j carries (U_i - U_j) / R, by Kirchhoff's current law one more
-term in the electrodes' balance: it adds [[1, -1], [-1, 1]] / R to their block of the matrix, which
-stays symmetric, so that reciprocity holds. R = 0 makes them one electrode.
+A resistor R between electrodes i and j carries (U_i - U_j) / R. By Kirchhoff's current law this is
+one more term in the electrodes' balance: it adds [[1, -1], [-1, 1]] / R to their block of the
+matrix, which stays symmetric, so reciprocity holds. R = 0 makes them one electrode.
 """
 
 from dataclasses import dataclass, replace
@@ -20,13 +21,13 @@ SUMMARY = "Electrodes are joined by a resistance."
 
 @dataclass(frozen=True)
 class Parameters:
-    """Which, and by what."""
+    """The electrodes, and the resistance between them."""
 
     electrodes: tuple[int, ...] = parameter(
         (0, 1), "", "electrodes joined in a chain (from 0)", low=0
     )
     resistance_ohm: float = parameter(
-        10.0, "ohm", "between one and the next of the chain", low=0, high=1e12
+        10.0, "ohm", "resistance between neighbours in the chain", low=0, high=1e12
     )
 
     def __post_init__(self) -> None:
@@ -37,7 +38,7 @@ class Parameters:
 
 
 def make(parameters: Parameters, session: EffectSession) -> ContactStep:
-    """Adds the bridges."""
+    """Return the step that adds the bridges."""
     session.refuse_absent(parameters.electrodes)
     bridges = tuple((i, j, parameters.resistance_ohm) for i, j in pairwise(parameters.electrodes))
 

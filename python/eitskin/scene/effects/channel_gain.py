@@ -1,11 +1,10 @@
-"""Channels with gains of their own: in instruments with an amplifier for each measuring pair, gains
-do not match.
+"""A gain for each measuring pair: in instruments with an amplifier per pair, gains do not match.
 
-Resistors of 1 % make gains that differ by about 1 %. Each measuring pair (V+, V-) is a channel with
-the gain 1 + uniform(-spread, spread), drawn once; so many as are wired the other way round have the
-opposite sign. Two rows that reciprocity makes equal are read by
-different channels, so their difference tells the mismatch; a difference image relative to the
-reference (dv / v) cancels it.
+Resistors of 1 % make gains that differ by about 1 %. Each measuring pair (V+, V-) is a channel of
+the instrument with the gain 1 + uniform(-spread, spread), drawn once; a part ``inverted`` of the
+channels is wired the other way round and has the opposite sign. Two rows that are equal by
+reciprocity are read by different channels, so their difference shows the mismatch; a difference
+image relative to the reference (dv / v) cancels it.
 """
 
 from dataclasses import dataclass
@@ -19,12 +18,12 @@ from eitskin.scene.scan import channels
 NAME = "channel_gain"
 STAGE = Stage.FRONT_END
 ORDER = 60
-SUMMARY = "Each measuring pair has a gain of its own."
+SUMMARY = "Each measuring pair has its own gain."
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """How far gains differ, and how many are negative."""
+    """The spread of the gains, and the fraction of them that is negative."""
 
     spread: float = parameter(
         0.01, "1", "each channel's gain differs from 1 by up to this", low=0, high=1
@@ -35,7 +34,7 @@ class Parameters:
 
 
 def gains(parameters: Parameters, session: EffectSession) -> FloatArray:
-    """The gain of each row's channel, (m,)."""
+    """Return the gain of each row's channel, (m,)."""
     pairs, number = channels(session.protocol)
     drawn = session.stream(NAME).uniform(-parameters.spread, parameters.spread, len(pairs))
     gain = 1 + drawn
@@ -46,7 +45,7 @@ def gains(parameters: Parameters, session: EffectSession) -> FloatArray:
 
 
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
-    """Multiplies each row by its channel's gain."""
+    """Return the step that multiplies each row by the gain of its channel."""
     factors = gains(parameters, session)
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:

@@ -2,14 +2,12 @@
 
 In the complete electrode model (Cheng, Isaacson, Newell and Gisser, IEEE Trans. Biomed. Eng. 36,
 1989; Somersalo, Cheney and Isaacson, SIAM J. Appl. Math. 52, 1992) the potential drops by z times
-the current density across the
-interface: phi + z sigma dphi/dn = U. Fitted to saline of 0.35 to 3.4 S/m on metal, Cheng et al.
-    found 58 down to 7.5
-ohm cm2 (6e-3 to 8e-4 ohm m2). z = 0 is an ideal shunt. Electrodes differ: z_l = mean (1 +
-uniform(-spread, spread)), drawn once.
+the current density across the interface: phi + z sigma dphi/dn = U. For saline of 0.35 to 3.4 S/m
+on metal, Cheng et al. fitted 58 down to 7.5 ohm cm2 (6e-3 to 8e-4 ohm m2). z = 0 is an ideal shunt.
+Electrodes differ: z_l = mean (1 + uniform(-spread, spread)), drawn once.
 
 Contacts may change after the tare, suddenly, as by a knock, or slowly, as by drying: each is
-multiplied by exp(change p(t) n) with its own normal number n, p rising from 0 to 1.
+multiplied by exp(change p(t) n) with its own normal number n, where p rises from 0 to 1.
 """
 
 from dataclasses import dataclass, replace
@@ -36,7 +34,7 @@ SUMMARY = "Current meets a resistance where it enters and leaves the skin."
 
 @dataclass(frozen=True)
 class Parameters:
-    """The electrodes' mean, and how they differ."""
+    """The mean impedance of the electrodes, and how they differ and change."""
 
     mean_ohm_m2: float = parameter(
         0.01, "ohm m2", "resistance of a contact times its area", low=0, high=1e3
@@ -46,10 +44,10 @@ class Parameters:
     )
 
     change: float = parameter(
-        0.0, "1", "standard deviation of the logarithm of each one's change", low=0, high=3
+        0.0, "1", "standard deviation of the logarithm of their changes", low=0, high=3
     )
-    change_at_s: float = parameter(0.0, "s", "when the change begins")
-    change_rise_s: float = parameter(0.0, "s", "time until it is whole; 0: at once", low=0)
+    change_at_s: float = parameter(0.0, "s", "time at which the change begins")
+    change_rise_s: float = parameter(0.0, "s", "time until it is complete; 0: at once", low=0)
 
     def __post_init__(self) -> None:
         if self.spread == 1:
@@ -57,7 +55,7 @@ class Parameters:
 
 
 def impedances(parameters: Parameters, count: int, session: EffectSession) -> FloatArray:
-    """(count,) in ohm m2. Draws nothing without a spread."""
+    """Return the impedances (count,) in ohm m2. No random number is drawn if the spread is 0."""
     if parameters.spread == 0:
         return np.full(count, parameters.mean_ohm_m2)
     part = session.stream(NAME).uniform(-parameters.spread, parameters.spread, count)
@@ -65,7 +63,7 @@ def impedances(parameters: Parameters, count: int, session: EffectSession) -> Fl
 
 
 def make(parameters: Parameters, session: EffectSession) -> ContactStep:
-    """Every electrode's contact impedance, drawn once."""
+    """Return the step that sets every electrode's contact impedance, drawn once."""
     count = session.skin.electrodes.count
     impedance = impedances(parameters, count, session)
     note = f"{parameters.mean_ohm_m2:g} ohm m2, differing by up to {100 * parameters.spread:g} %"

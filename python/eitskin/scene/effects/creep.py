@@ -1,14 +1,14 @@
-"""A skin that gives way under a pull that stays, and comes back slowly when it is let go.
+"""A skin that creeps under a constant pull, and recovers slowly when the pull ends.
 
-A standard linear solid (a spring beside a damper, in line with a spring; Findley, Lai and Onaran,
-Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976): under a constant pull from ``at_s``
-on
+It is a standard linear solid (a spring in parallel with a damper, in series with a spring; Findley,
+Lai and Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976). Under a constant
+pull from ``at_s`` on,
 
     strain(t) = strain (1 + creep (1 - exp(-(t - at) / tau))),
 
-and after ``until_s`` the elastic part is gone at once and the crept part decays with tau. What the
-strain does to sheet and electrodes is as of ``stretch``, with free sides. A tare just after the
-release is wrong for some tau.
+and after ``until_s`` the elastic part vanishes at once while the crept part decays with tau. The
+strain acts on skin and electrodes as in ``stretch``, with free sides. A tare just after the release
+is wrong for a time of about tau.
 """
 
 from dataclasses import dataclass
@@ -21,25 +21,26 @@ from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Sta
 NAME = "creep"
 STAGE = Stage.MATERIAL
 ORDER = 6
-SUMMARY = "The skin gives way under a pull that stays, and comes back slowly."
+SUMMARY = "The skin creeps under a constant pull, and recovers slowly."
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """How far at once, how much more, how slowly, when."""
+    """The immediate strain, the creep, its time constant, and the time and direction of the
+    pull."""
 
-    strain: float = parameter(0.05, "1", "length gained at once / length", low=-0.2, high=0.5)
-    creep: float = parameter(0.3, "1", "crept in the end / gained at once", low=0, high=2)
+    strain: float = parameter(0.05, "1", "immediate gain of length / length", low=-0.2, high=0.5)
+    creep: float = parameter(0.3, "1", "final creep / immediate strain", low=0, high=2)
     time_constant_s: float = parameter(
-        60.0, "s", "in which 63 % of the creep happens", low=0, open_low=True
+        60.0, "s", "time in which 63 % of the creep happens", low=0, open_low=True
     )
-    direction_deg: float = parameter(0.0, "deg", "of the pull, from the x axis")
-    at_s: float = parameter(0.0, "s", "when the pull begins")
-    until_s: float | None = parameter(None, "s", "when it ends; without it, never")
+    direction_deg: float = parameter(0.0, "deg", "direction of the pull, from the x axis")
+    at_s: float = parameter(0.0, "s", "time at which the pull begins")
+    until_s: float | None = parameter(None, "s", "time at which it ends; never if left out")
 
 
 def strain_at(time_s: float, parameters: Parameters) -> float:
-    """The strain at ``time_s``."""
+    """Return the strain at ``time_s``."""
     end = float("inf") if parameters.until_s is None else parameters.until_s
     tau, most = parameters.time_constant_s, parameters.strain * parameters.creep
     if time_s < parameters.at_s or end <= parameters.at_s:
@@ -51,7 +52,7 @@ def strain_at(time_s: float, parameters: Parameters) -> float:
 
 
 def make(parameters: Parameters, session: EffectSession) -> DeformationStep:
-    """A solve for each frame while it creeps."""
+    """Return the step with a solve for each frame, as the strain creeps."""
 
     def apply(time_s: float, frame: int) -> Deformation:
         along = 1 + strain_at(time_s, parameters)

@@ -1,11 +1,11 @@
-"""Cross-talk: wires of electrodes next in number couple, so that a measuring wire picks up its
-neighbours' potential.
+"""Cross-talk: wires with neighbouring numbers couple, so a measuring wire picks up the potential of
+its neighbours.
 
-Neighbouring wires of a ribbon cable, and neighbouring switches of a multiplexer, couple by a
-capacitance of the order of a pF; a datasheet states the part that comes through in dB (the ADG1206:
+Neighbouring wires of a ribbon cable and neighbouring switches of a multiplexer couple by a
+capacitance of the order of a pF. Datasheets state the part that comes through in dB (the ADG1206:
 -85 dB at 1 MHz, in 50 ohm; cables with higher source impedances are far worse). The driven wires
-carry by far the largest potentials, so they alone are taken as sources: a measuring wire next in
-number to a driven one gets 10^(dB / 20) of its potential, against the mean of all electrodes. The
+have by far the largest potentials, so only they count as sources: a measuring wire next in number
+to a driven one gets 10^(dB / 20) of its potential, relative to the mean of all electrodes. The
 first and the last wire are not neighbours.
 """
 
@@ -33,7 +33,7 @@ SUMMARY = "Driven wires couple into measuring wires beside them."
 
 @dataclass(frozen=True)
 class Parameters:
-    """How much."""
+    """The strength of the coupling."""
 
     coupling_db: float = parameter(
         -60.0, "dB", "voltage picked up / the driven wire's potential", low=-300, high=0
@@ -41,8 +41,8 @@ class Parameters:
 
 
 def pick_up(protocol: Protocol) -> tuple[FloatArray, FloatArray]:
-    """How often the source's and the sink's wire couples into each row's voltage, (m,) each, in
-    {-1, 0, 1}."""
+    """Return how often the wires of the source and the sink couple into each row's voltage, (m,)
+    each, in {-1, 0, 1}."""
     rows = protocol.drive_measure.astype(np.int64)
     beside = (np.abs(rows[:, None, :2] - rows[:, 2:, None]) == 1).astype(
         np.float64
@@ -52,7 +52,7 @@ def pick_up(protocol: Protocol) -> tuple[FloatArray, FloatArray]:
 
 
 def make(parameters: Parameters, session: EffectSession) -> LoadedStep:
-    """Adds what comes through from the two driven wires."""
+    """Return the step that adds what comes through from the two driven wires."""
     part = 10 ** (parameters.coupling_db / 20)
     of_source, of_sink = (part * weight for weight in pick_up(session.protocol))
 

@@ -1,9 +1,9 @@
-"""Electrodes that have come off: no current passes them, and nothing is read on them.
+"""Electrodes that have come off the skin: they carry no current, and nothing is read on them.
 
-The complete electrode model's limit for an infinite contact impedance: the rim under a detached
-electrode is insulated. A current source on it drives nothing (its output only rises to the supply),
-and an input on it floats; both are taken to read 0 V in every row that uses the electrode. A
-wobbling plug is off during a part of the time only.
+This is the limit of the complete electrode model for an infinite contact impedance: the rim under a
+detached electrode is insulated. A current source on it drives nothing (its output only rises to the
+supply), and an input on it floats; in both cases every row that uses the electrode is assumed to
+read 0 V. A loose plug is off only part of the time.
 """
 
 from dataclasses import dataclass, replace
@@ -22,9 +22,9 @@ SUMMARY = "Electrodes come off the skin."
 
 @dataclass(frozen=True)
 class Parameters:
-    """Which, and when."""
+    """The electrodes, and the time during which they are off."""
 
-    electrodes: tuple[int, ...] = parameter((0,), "", "those that come off (from 0)", low=0)
+    electrodes: tuple[int, ...] = parameter((0,), "", "electrodes that come off (from 0)", low=0)
     from_s: float | None = parameter(None, "s", "when they come off; at the start if left out")
     until_s: float | None = parameter(None, "s", "when they touch again; never if left out")
 
@@ -40,14 +40,14 @@ class Parameters:
 
 
 def is_off(time_s: float, parameters: Parameters) -> bool:
-    """Whether the electrodes are off at ``time_s``: from ``from_s`` on, until just before
+    """Return whether the electrodes are off at ``time_s``: from ``from_s`` on, until just before
     ``until_s``."""
     came_off = parameters.from_s is None or time_s >= parameters.from_s
     return came_off and (parameters.until_s is None or time_s < parameters.until_s)
 
 
 def make(parameters: Parameters, session: EffectSession) -> ContactStep:
-    """Marks the electrodes while they are off."""
+    """Return the step that marks the electrodes while they are off."""
     session.refuse_absent(parameters.electrodes)
     gone = np.isin(np.arange(session.skin.electrodes.count), parameters.electrodes)
     lost = np.asarray(gone[session.protocol.drive_measure].any(axis=1))

@@ -1,10 +1,10 @@
-"""Mains hum: what is left of the power line's 50 or 60 Hz after the demodulator.
+"""Mains hum: the remainder of the power line's 50 or 60 Hz after the demodulator.
 
 Electric fields of the mains couple into high-impedance wires (Huhta and Webster, IEEE Trans.
-Biomed. Eng. 20, 1973). It adds amplitude sin(2 pi f t + phase) to every row, at the time at which
-that row is read: rows follow each other evenly over a frame, so that neighbouring rows see nearly
-the same, and rows of one number sample it at the frame rate r, where it shows at the aliased
-frequency |f - r round(f / r)|.
+Biomed. Eng. 20, 1973). The effect adds amplitude sin(2 pi f t + phase) to every row at the time at
+which that row is read. Rows are read at equal intervals over a frame, so neighbouring rows see
+nearly the same value, and the same row samples the hum at the frame rate r, where it appears at the
+aliased frequency |f - r round(f / r)|.
 """
 
 from dataclasses import dataclass
@@ -24,22 +24,25 @@ SUMMARY = "The power line's hum is added to every row."
 
 @dataclass(frozen=True)
 class Parameters:
-    """The hum at the demodulator's output."""
+    """The hum at the output of the demodulator."""
 
     amplitude_v: float = parameter(1e-3, "V", "peak amplitude", low=0, high=1e6)
-    frequency_hz: float = parameter(50.0, "Hz", "the power line's", low=0, high=1e6, open_low=True)
+    frequency_hz: float = parameter(
+        50.0, "Hz", "frequency of the mains", low=0, high=1e6, open_low=True
+    )
     phase_deg: float = parameter(
-        0.0, "deg", "of the sine at the first recorded frame", low=-360, high=360
+        0.0, "deg", "phase at the first recorded frame", low=-360, high=360
     )
 
 
 def alias_hz(frequency_hz: float, rate_hz: float) -> float:
-    """Where a sine of ``frequency_hz`` shows when it is sampled at ``rate_hz``: 0 to rate / 2."""
+    """Return the frequency, 0 to rate / 2, at which a sine of ``frequency_hz`` appears when sampled
+    at ``rate_hz``."""
     return abs(frequency_hz - rate_hz * round(frequency_hz / rate_hz))
 
 
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
-    """Adds the sine at each row's own time."""
+    """Return the step that adds the sine at each row's own time."""
     delays_s = row_delays_s(session)
     omega, phase = 2 * pi * parameters.frequency_hz, radians(parameters.phase_deg)
 

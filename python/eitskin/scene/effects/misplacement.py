@@ -1,7 +1,7 @@
-"""Electrodes that are not where the description says: each is shifted along the rim.
+"""Electrodes that are not where the description puts them: each is shifted along the rim.
 
-Hand-made skins carry electrodes to about a millimetre. Shifts are given, or uniform within +-
-spread, drawn once; a reconstruction that assumes the described places then has a wrong model (the
+Hand-made skins place electrodes to about a millimetre. Shifts are given, or uniform within +-
+spread, drawn once. A reconstruction that assumes the described places then uses a wrong model (the
 classical modelling error of absolute EIT; difference imaging cancels most of it).
 """
 
@@ -17,26 +17,26 @@ from eitskin.skin.skin import Skin
 NAME = "misplacement"
 STAGE = Stage.GEOMETRY
 ORDER = 10
-SUMMARY = "Electrodes sit beside the places that the description gives."
+SUMMARY = "Electrodes are shifted from their described places."
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """By chance, or as measured."""
+    """The range of random shifts, or known shifts."""
 
     spread_mm: float = parameter(
-        1.0, "mm", "each electrode is shifted along the rim by up to this, either way", low=0
+        1.0, "mm", "each electrode is shifted along the rim by up to +- this", low=0
     )
     shift_mm: tuple[float, ...] = parameter(
         (),
         "mm",
-        "known shifts instead, one an electrode, along the numbering; nothing is then drawn",
+        "known shifts instead, one per electrode, in the direction of numbering",
     )
 
 
 def shifted(skin: Skin, shift_mm: FloatArray) -> Skin:
-    """``skin`` with each electrode moved by ``shift_mm`` (L,) along the rim, in the direction of
-    numbering."""
+    """Return ``skin`` with each electrode moved by ``shift_mm`` (L,) along the rim, in the
+    direction of numbering."""
     electrodes = skin.electrodes
     along = np.arange(electrodes.count) * (skin.outline.perimeter_mm / electrodes.count)
     if electrodes.positions_mm is not None:
@@ -46,7 +46,7 @@ def shifted(skin: Skin, shift_mm: FloatArray) -> Skin:
 
 
 def make(parameters: Parameters, session: EffectSession) -> GeometryStep:
-    """The skin that is meshed."""
+    """Return the step that gives the skin to be meshed."""
     count, spread = session.skin.electrodes.count, parameters.spread_mm
     known = len(parameters.shift_mm)
     if known not in (0, count):

@@ -1,9 +1,9 @@
-"""White noise: normal, of one deviation on every row, independent from row to row and frame to
-frame.
+"""White noise: normal, with the same deviation on every row, independent from row to row and frame
+to frame.
 
-Thermal and amplifier noise in the demodulator's band. The signal-to-noise ratio counts against the
-exact frame V0 of the untouched skin with ideal electrodes: SNR_dB = 20 log10(rms(V0) / sigma), rms
-over the protocol's rows.
+It stands for thermal and amplifier noise in the band of the demodulator. The signal-to-noise ratio
+refers to the exact frame V0 of the untouched skin with ideal electrodes: SNR_dB = 20 log10(rms(V0)
+/ sigma), rms over the rows of the protocol.
 """
 
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ DEFAULT_SNR_DB = 60.0
 
 @dataclass(frozen=True)
 class Parameters:
-    """Its size, in one of two ways; 60 dB without either."""
+    """The size of the noise, as an SNR or as a voltage; 60 dB if neither is given."""
 
     snr_db: float | None = parameter(
-        None, "dB", "20 log10(rms of the untouched frame / deviation)", low=-100, high=300
+        None, "dB", "20 log10(rms of the untouched frame / noise)", low=-100, high=300
     )
     noise_v: float | None = parameter(None, "V", "standard deviation", low=0, high=1e6)
 
@@ -36,6 +36,7 @@ class Parameters:
 
 
 def deviation_v(parameters: Parameters, session: EffectSession) -> float:
+    """Return the standard deviation of the noise in V."""
     if parameters.noise_v is not None:
         return parameters.noise_v
     snr_db = DEFAULT_SNR_DB if parameters.snr_db is None else parameters.snr_db
@@ -43,7 +44,7 @@ def deviation_v(parameters: Parameters, session: EffectSession) -> float:
 
 
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
-    """Adds a fresh draw to each frame."""
+    """Return the step that adds a new draw to each frame."""
     sigma_v = deviation_v(parameters, session)
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:

@@ -1,9 +1,9 @@
-"""Offsets of the channels: what each reads where there is nothing.
+"""Offsets of the channels: the reading of each without a signal.
 
-An amplifier's input offset and bias currents across its source are added to the signal
-(Pallas-Areny and Webster, Sensors and Signal Conditioning); a standing common mode that is rejected
-alike in every row is the same to a reader. The offset of a measuring pair (V+, V-) is common +
-spread normal(), drawn once, in parts of the rms of the untouched frame V0. A difference image
+The input offset of an amplifier, and its bias currents across the source, are added to the signal
+(Pallas-Areny and Webster, Sensors and Signal Conditioning). A constant common mode that is rejected
+equally in every row looks the same to the reader. The offset of a measuring pair (V+, V-) is common
++ spread normal(), drawn once, relative to the rms of the untouched frame V0. A difference image
 cancels it; behind a rectifier it decides which rows grow and which shrink when a finger presses.
 """
 
@@ -18,12 +18,12 @@ from eitskin.scene.scan import channels
 NAME = "offset"
 STAGE = Stage.FRONT_END
 ORDER = 70
-SUMMARY = "Each measuring pair has an offset of its own."
+SUMMARY = "Each measuring pair has its own offset."
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """What channels share, and how far they differ."""
+    """The offset that channels share, and how much they differ."""
 
     common: float = parameter(
         0.0, "1", "all channels' offset / rms of the untouched frame", low=-100, high=100
@@ -34,14 +34,14 @@ class Parameters:
 
 
 def offsets_v(parameters: Parameters, session: EffectSession) -> FloatArray:
-    """Each row's offset (m,) V."""
+    """Return the offset of each row (m,) in V."""
     pairs, number = channels(session.protocol)
     drawn = session.stream(NAME).standard_normal(len(pairs))[number]
     return np.asarray(session.v0_rms_v() * (parameters.common + parameters.spread * drawn))
 
 
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
-    """Adds each row's."""
+    """Return the step that adds the offset of each row."""
     added_v = offsets_v(parameters, session)
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:

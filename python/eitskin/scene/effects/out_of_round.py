@@ -1,9 +1,10 @@
-"""An outline that is not cut as described: its radius waves with the angle.
+"""An outline that is not cut as described: its radius varies with the angle.
 
-The radius about the middle is multiplied by 1 + sum_k c_k cos(k angle - phase_k), k = 2 (oval) and
-3 (three-cornered), with normal c_k of deviation ``spread`` and even phases, drawn once, and scaled
-so that the area stays. Electrodes keep their parts of the rim. What a wrong outline does to images:
-Kolehmainen, Lassas and Ola, SIAM J. Appl. Math. 66, 2005; difference imaging cancels most of it.
+The radius about the middle is multiplied by 1 + sum_k c_k cos(k angle - phase_k) for k = 2 (oval)
+and 3 (three-cornered), with normal c_k of deviation ``spread`` and uniform phases, drawn once, and
+scaled so that the area is kept. Electrodes keep their fractions of the rim. Kolehmainen, Lassas and
+Ola (SIAM J. Appl. Math. 66, 2005) show what a wrong outline does to images; difference imaging
+cancels most of it.
 """
 
 from dataclasses import dataclass, replace
@@ -20,13 +21,13 @@ from eitskin.skin.skin import Skin
 NAME = "out_of_round"
 STAGE = Stage.GEOMETRY
 ORDER = 5
-SUMMARY = "The outline's radius waves with the angle."
+SUMMARY = "The radius of the outline varies with the angle."
 HARMONICS = (2, 3)
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """How far from the outline described."""
+    """The deviation from the described outline."""
 
     spread: float = parameter(
         0.02, "1", "standard deviation of each wave over the radius", low=0, high=0.2
@@ -34,7 +35,7 @@ class Parameters:
 
 
 def waved(outline: Outline, sizes: FloatArray, phases: FloatArray) -> Outline:
-    """``outline`` as a polygon with its radius waved, of the same area."""
+    """Return ``outline`` as a polygon with a varying radius and the same area."""
     corners = np.array(outline.vertices_mm)
     middle = np.array(outline.centre_mm)
     offsets = corners - middle
@@ -53,7 +54,7 @@ def waved(outline: Outline, sizes: FloatArray, phases: FloatArray) -> Outline:
 
 
 def bent(skin: Skin, outline: Outline) -> Skin:
-    """``skin`` with another outline, its electrodes at the same parts of the rim."""
+    """Return ``skin`` with another outline, its electrodes at the same fractions of the rim."""
     electrodes = skin.electrodes
     if electrodes.positions_mm is not None:
         ratio = outline.perimeter_mm / skin.outline.perimeter_mm
@@ -63,7 +64,7 @@ def bent(skin: Skin, outline: Outline) -> Skin:
 
 
 def make(parameters: Parameters, session: EffectSession) -> GeometryStep:
-    """The skin that is meshed."""
+    """Return the step that gives the skin to be meshed."""
     generator = session.stream(NAME)
     sizes = parameters.spread * generator.standard_normal(len(HARMONICS))
     phases = generator.uniform(0, 2 * pi, len(HARMONICS))
@@ -75,5 +76,5 @@ def make(parameters: Parameters, session: EffectSession) -> GeometryStep:
     def apply(skin: Skin) -> Skin:
         return bent(skin, waved(skin.outline, sizes, phases))
 
-    note = f"radius waves by up to {100 * np.abs(sizes).sum():.2g} %"
+    note = f"radius varies by up to {100 * np.abs(sizes).sum():.2g} %"
     return GeometryStep(NAME, EffectCost(random_numbers=2 * len(HARMONICS)), note, apply)

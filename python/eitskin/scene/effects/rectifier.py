@@ -1,9 +1,9 @@
-"""A rectifier: what is read is a magnitude, the sign is lost.
+"""A rectifier: the reading is a magnitude, and the sign is lost.
 
 Instruments that detect an amplitude by a diode bridge, a logarithmic or an RMS detector give |v|; a
 plain diode gives nothing below its forward drop (Horowitz and Hill, The Art of Electronics). It
-acts on what the amplifier puts out, offset, common mode and noise included. A row whose voltage is
-far from 0 keeps its change, or gives the negative of it; one near 0 is folded.
+acts on the output of the amplifier, including offset, common mode and noise. A row whose voltage is
+far from 0 keeps its change, or its negative; one near 0 is folded.
 """
 
 from dataclasses import dataclass
@@ -16,18 +16,18 @@ from eitskin.scene.effect import EffectCost, EffectSession, Stage, Voltages, Vol
 NAME = "rectifier"
 STAGE = Stage.DIGITISE
 ORDER = 25
-SUMMARY = "Magnitudes are read, without their signs."
+SUMMARY = "Only magnitudes are read, without signs."
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """How good the rectifier is."""
+    """The quality of the rectifier."""
 
-    drop_v: float = parameter(0.0, "V", "what is lost of each magnitude", low=0, high=1e6)
+    drop_v: float = parameter(0.0, "V", "loss of each magnitude", low=0, high=1e6)
 
 
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
-    """Folds every row."""
+    """Return the step that folds every row."""
     drop_v = parameters.drop_v
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:

@@ -1,8 +1,8 @@
-"""Saturation: an amplifier cannot go beyond its supply, so that larger voltages are clipped.
+"""Saturation: an amplifier cannot exceed its supply, so larger voltages are clipped.
 
-A hard limiter, symmetric about 0. The limit is given in V or as a multiple of the largest voltage
-of the untouched skin with ideal electrodes. The characteristic is the same for every row and has no
-memory: equal rows stay equal.
+It is a hard limiter, symmetric about 0. The limit is given in V or as a multiple of the largest
+voltage of the untouched skin with ideal electrodes. The characteristic is the same for every row
+and has no memory, so equal rows stay equal.
 """
 
 from dataclasses import dataclass
@@ -21,10 +21,10 @@ SUMMARY = "Voltages beyond a limit are clipped."
 
 @dataclass(frozen=True)
 class Parameters:
-    """The limit, in one of two ways; a headroom of 1.25 without either."""
+    """The limit as a voltage or as a headroom (default 1.25)."""
 
     limit_v: float | None = parameter(
-        None, "V", "the largest voltage either way", low=0, open_low=True
+        None, "V", "greatest magnitude of a voltage", low=0, open_low=True
     )
     headroom: float | None = parameter(
         None, "1", "limit / largest untouched voltage", low=0, high=1e6, open_low=True
@@ -36,7 +36,7 @@ class Parameters:
 
 
 def make(parameters: Parameters, session: EffectSession) -> VoltageStep:
-    """Clips every row."""
+    """Return the step that clips every row."""
     limit = session.limit_v(parameters.limit_v, parameters.headroom)
 
     def apply(v: Voltages, time_s: float, frame: int) -> Voltages:

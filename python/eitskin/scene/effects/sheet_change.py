@@ -1,8 +1,8 @@
-"""A sheet that changes after the tare, here more and there less: suddenly, or slowly.
+"""A skin whose conductivity changes unevenly after the tare, suddenly or slowly.
 
-Water, warmth and wear move unevenly, so the change is a smooth random field f of unit variance over
-place (``scene/random_field.py``): the conductivity is multiplied by exp(spread p(t) f), p rising
-from 0 to 1. A difference image shows all of it, for the reference knows nothing of it.
+Water, warmth and wear are uneven, so the change is a smooth random field f of unit variance over
+place (``scene/random_field.py``): the conductivity is multiplied by exp(spread p(t) f), where p
+rises from 0 to 1. A difference image shows all of it, because the reference does not include it.
 """
 
 from dataclasses import dataclass
@@ -21,20 +21,21 @@ SUMMARY = "The skin's conductivity has changed since the tare, unevenly."
 
 @dataclass(frozen=True)
 class Parameters:
-    """How much, how smoothly, when."""
+    """The strength and smoothness of the change, and its time."""
 
     spread: float = parameter(
-        0.02, "1", "relative standard deviation of the change over the sheet", low=0, high=1
+        0.02, "1", "relative standard deviation of the change over the skin", low=0, high=1
     )
     length_mm: float = parameter(
-        60.0, "mm", "distance over which the change is alike", low=0, open_low=True
+        60.0, "mm", "correlation length of the change", low=0, open_low=True
     )
-    at_s: float = parameter(0.0, "s", "when it begins")
-    rise_s: float = parameter(0.0, "s", "time until it is whole; 0: at once", low=0)
+    at_s: float = parameter(0.0, "s", "time at which it begins")
+    rise_s: float = parameter(0.0, "s", "time until it is complete; 0: at once", low=0)
 
 
 def make(parameters: Parameters, session: EffectSession) -> MaterialStep:
-    """One field, drawn once; frames in which the same part has happened share a solve."""
+    """Return the step with one field, drawn once; frames in which the same part has happened share
+    a solve."""
     places = session.mesh.centroids_mm()
     log_change = parameters.spread * random_field(
         places, parameters.length_mm, session.stream(NAME)

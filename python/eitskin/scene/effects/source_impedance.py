@@ -1,11 +1,11 @@
 """A current source with a finite output impedance: a larger load gets less current.
 
-The source's current divides between its output impedance (a resistance parallel to stray
-capacitance) and the load, so that the load's share is 1 / (1 + Z_load Y_out), Y_out = 1 / R + j w
-C. Howland sources reach some 100 kohm to 1 Mohm at 50 kHz, with tens of pF (Bertemes-Filho, Felipe
-and Vincence, Circuits and Systems 4, 2013). The load is the sheet with its contacts, seen from the
-driven pair, and what lies in series (two multiplexers' on-resistance). Where no ``phase`` is named,
-the part in phase with the current is taken, in real arithmetic.
+The current of the source divides between its output impedance (a resistance parallel to stray
+capacitance) and the load, so the load gets the share 1 / (1 + Z_load Y_out), Y_out = 1 / R + j w C.
+Howland sources reach some 100 kohm to 1 Mohm at 50 kHz, with tens of pF (Bertemes-Filho, Felipe and
+Vincence, Circuits and Systems 4, 2013). The load is the skin with its contacts, seen from the
+driven pair, and whatever lies in series (the on-resistance of two multiplexers). If no ``phase`` is
+named, the part in phase with the current is used, in real arithmetic.
 """
 
 from dataclasses import dataclass
@@ -25,23 +25,23 @@ SHARED = {"frequency_hz": "excitation frequency"}
 
 @dataclass(frozen=True)
 class Parameters:
-    """The output impedance, and what is in series with the skin."""
+    """The output impedance, and the resistance in series with the skin."""
 
     resistance_ohm: float = parameter(500e3, "ohm", "output resistance", low=0, open_low=True)
     capacitance_pf: float = parameter(
         20.0, "pF", "stray capacitance parallel to it", low=0, high=1e9
     )
     frequency_hz: float = parameter(
-        50e3, "Hz", "the excitation's; 0 is direct current", low=0, high=1e9
+        50e3, "Hz", "excitation frequency; 0 is direct current", low=0, high=1e9
     )
     series_ohm: float = parameter(
-        0.0, "ohm", "in series with the skin, as closed switches", low=0, high=1e9
+        0.0, "ohm", "resistance in series with the skin, such as closed switches", low=0, high=1e9
     )
 
 
 def share(load_ohm: Voltages, parameters: Parameters) -> Voltages:
-    """The part of the current that passes the load, (m,); for real loads the part in phase, which
-    is real."""
+    """Return the part of the current that passes the load, (m,); for real loads the part in phase,
+    which is real."""
     total = load_ohm + parameters.series_ohm
     conductance = 1 / parameters.resistance_ohm
     susceptance = 2 * pi * parameters.frequency_hz * parameters.capacitance_pf * 1e-12
@@ -52,7 +52,8 @@ def share(load_ohm: Voltages, parameters: Parameters) -> Voltages:
 
 
 def make(parameters: Parameters, session: EffectSession) -> LoadedStep:
-    """Scales each row by the share of current its drive pair's load gets."""
+    """Return the step that scales each row by the share of current that the load of its drive pair
+    gets."""
 
     def apply(v: Voltages, loads: Loads, time_s: float, frame: int) -> Voltages:
         return np.asarray(v * share((loads.source_v - loads.sink_v) / loads.current_a, parameters))

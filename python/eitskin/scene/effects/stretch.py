@@ -1,10 +1,10 @@
-"""A skin that is pulled lengthwise after the tare: sheet and electrodes deform together.
+"""A skin that is pulled lengthwise after the tare: it deforms together with its electrodes.
 
-Lengths along the pull become 1 + strain; the volume stays, so that a free sheet gets narrower and
-thinner by 1 / sqrt(1 + strain) each, and one held at its sides thinner only. The resistivity of a
-gel stays (Keplinger et al., Science 341, 2013), so a free strip's resistance goes with the square
-of its length. Touches stay on the material that they are on. To tare the stretched skin, let it
-begin before the quiet frames (``at_s`` of -1000).
+Lengths along the pull become 1 + strain. The volume is kept, so a free skin becomes narrower and
+thinner by 1 / sqrt(1 + strain) each, and one held at its sides only becomes thinner. The
+resistivity of a gel stays (Keplinger et al., Science 341, 2013), so the resistance of a free strip
+follows the square of its length. Touches stay on the material under them. To tare the stretched
+skin, let the pull begin before the untouched frames (``at_s`` of -1000).
 """
 
 from dataclasses import dataclass
@@ -21,17 +21,18 @@ SUMMARY = "The skin is pulled lengthwise, electrodes with it."
 
 @dataclass(frozen=True)
 class Parameters:
-    """How far, which way, when."""
+    """The strain, its direction, and its time."""
 
     strain: float = parameter(0.1, "1", "length gained / length", low=-0.3, high=1.0)
-    direction_deg: float = parameter(0.0, "deg", "of the pull, from the x axis")
-    sides: str = parameter("free", "", "whether the sides may come in", choices=("free", "held"))
-    at_s: float = parameter(0.0, "s", "when it begins")
-    rise_s: float = parameter(0.0, "s", "time until it is whole; 0: at once", low=0)
+    direction_deg: float = parameter(0.0, "deg", "direction of the pull, from the x axis")
+    sides: str = parameter("free", "", "whether sides may move in", choices=("free", "held"))
+    at_s: float = parameter(0.0, "s", "time at which it begins")
+    rise_s: float = parameter(0.0, "s", "time until it is complete; 0: at once", low=0)
 
 
 def make(parameters: Parameters, session: EffectSession) -> DeformationStep:
-    """The strain rises evenly; frames with the same strain share a solve."""
+    """Return the step in which the strain rises linearly; frames with equal strain share a
+    solve."""
 
     def apply(time_s: float, frame: int) -> Deformation:
         along = 1 + parameters.strain * part_at(time_s, parameters.at_s, parameters.rise_s)

@@ -1,9 +1,9 @@
-"""Warmth: the conductivity of an aqueous electrolyte rises by about 2 % a kelvin.
+"""Warmth: the conductivity of an aqueous electrolyte rises by about 2 % per kelvin.
 
-sigma(T) = sigma_0 (1 + alpha (T - T_0)), the linear compensation that conductivity meters use;
+sigma(T) = sigma_0 (1 + alpha (T - T_0)) is the linear compensation that conductivity meters use.
 alpha is 0.019 to 0.022 per K for dilute salts near 25 degrees C (ISO 7888 gives the tables),
 because water becomes less viscous and ions move faster. T_0 is the temperature at which the skin
-has the conductivity in its description. Time counts from the session's first frame.
+has the described conductivity. Time counts from the session's first frame.
 """
 
 from dataclasses import dataclass
@@ -22,27 +22,31 @@ SUMMARY = "The skin's conductivity follows its temperature."
 
 @dataclass(frozen=True)
 class Parameters:
-    """The temperature's course, and what a kelvin does."""
+    """The temperature over time, and the effect of a kelvin."""
 
     offset_k: float = parameter(
-        0.0, "K", "temperature at the first frame - described skin's", low=-50, high=100
+        0.0,
+        "K",
+        "temperature at the first frame above that of the described skin",
+        low=-50,
+        high=100,
     )
     drift_k_per_min: float = parameter(
-        0.2, "K/min", "how fast the temperature rises", low=-1000, high=1000
+        0.2, "K/min", "rate at which the temperature rises", low=-1000, high=1000
     )
     coefficient_per_k: float = parameter(
-        0.02, "1/K", "relative change of conductivity a kelvin", low=-0.1, high=0.1
+        0.02, "1/K", "relative change of conductivity per kelvin", low=-0.1, high=0.1
     )
 
 
 def temperature_factor(age_s: float, parameters: Parameters) -> float:
-    """The conductivity ``age_s`` after the first frame, relative to the described skin's."""
+    """Return the conductivity ``age_s`` after the first frame, relative to the described skin's."""
     warmer_k = parameters.offset_k + parameters.drift_k_per_min * age_s / 60
     return 1 + parameters.coefficient_per_k * warmer_k
 
 
 def make(parameters: Parameters, session: EffectSession) -> MaterialStep:
-    """The skin's conductivity by time, one factor for all elements."""
+    """Return the step that scales the conductivity over time, with one factor for all elements."""
     times_s = session.times_s()
     ages_s = (0.0, float(times_s[-1] - times_s[0]))
     if min(temperature_factor(age_s, parameters) for age_s in ages_s) <= 0:
