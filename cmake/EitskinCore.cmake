@@ -8,7 +8,7 @@ set(EITSKIN_CORE_SOURCES
     model/model.c model/options.c model/force.c model/row_form.c model/uncertainty.c model/scan_order.c
     context/column_cache.c context/products.c context/triangle.c
     context/projection.c context/places.c frame/reference.c frame/places.c frame/fold.c frame/regularisation.c frame/whitening.c
-    frame/whitening_products.c frame/rows_out.c frame/follow.c
+    frame/whitening_products.c frame/rows_out.c frame/reference_tracking.c
     diagnostics/electrodes.c diagnostics/outliers.c diagnostics/model_mismatch.c
     diagnostics/crowded.c diagnostics/reference_outliers.c
     solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c

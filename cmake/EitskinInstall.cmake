@@ -19,6 +19,8 @@ write_basic_package_version_file(
 install(FILES cmake/eitskin-config.cmake ${PROJECT_BINARY_DIR}/eitskin-config-version.cmake
         DESTINATION ${package} COMPONENT core)
 
+# from the .pc files to the prefix, which `cmake --install --prefix` may choose
+file(RELATIVE_PATH EITSKIN_PC_UP "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
 foreach(name eitskin eitskin64)
     set(EITSKIN_PC_NAME ${name})
     set(EITSKIN_PC_LIBRARY eitskin_f32)

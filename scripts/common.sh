@@ -7,21 +7,36 @@ unset PYTHONDONTWRITEBYTECODE # what pip does not compile, Python keeps once it 
 
 say() { printf '%s\n' "== $*"; }
 
-# debian COMMAND-OR-FILE PACKAGE...: install the packages unless the first word is there; as root by apt, else say how.
-debian() {
-    wanted=$1
+# want COMMAND-OR-FILE PACKAGE...: note the Debian packages unless the first word is there.
+missing=
+want() {
+    command -v "$1" >/dev/null 2>&1 && return 0
+    [ -e "$1" ] && return 0
     shift
-    command -v "$wanted" >/dev/null 2>&1 && return 0
-    [ -e "$wanted" ] && return 0
+    missing="$missing $*"
+}
+
+# install_wanted: the packages that were noted, together; as root by apt, which waits where it runs already, else say how.
+install_wanted() {
+    [ -n "$missing" ] || return 0
     if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
-        say "installing $* with apt-get"
-        { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@"; } >/dev/null && return 0
-        say "apt-get could not install $*; install it and start again"
+        say "installing$missing with apt-get"
+        {
+            apt-get -o DPkg::Lock::Timeout=600 update -qq &&
+                DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=600 install -y -qq --no-install-recommends $missing
+        } >/dev/null && missing= && return 0
+        say "apt-get could not install$missing; install it and start again"
         exit 1
     fi
-    say "missing: $wanted. Run this, then start again:"
-    printf '   sudo apt-get install -y %s\n' "$*"
+    say "Debian packages are missing. Run this, then start again:"
+    printf '   sudo apt-get install -y%s\n' "$missing"
     exit 1
+}
+
+# debian COMMAND-OR-FILE PACKAGE...: install the packages unless the first word is there.
+debian() {
+    want "$@"
+    install_wanted
 }
 
 # The first Python from 3.10 on, and its headers.

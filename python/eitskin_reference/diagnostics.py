@@ -20,7 +20,6 @@ from eitskin.model.row_form import RowForm
 from eitskin_reference.constants_table import (
     CROWD_CLEAR,
     CROWD_CLEAREST,
-    CROWD_ELECTRODES,
     CROWD_FAINT,
     CROWD_FAR,
     CROWD_LEFT,
@@ -435,7 +434,7 @@ class Examiner:
         ]
         weakest = min(touch.explained for touch in touches)
         features = (
-            count * CROWD_ELECTRODES / self.model.protocol.n_electrodes,
+            count / self.model.protocol.n_electrodes,
             min([CROWD_FAR, *apart]),
             max(touch.radius_mm for touch in touches) / options.touch_seed_radius_mm,
             np.sqrt(left),

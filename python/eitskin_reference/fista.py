@@ -10,7 +10,6 @@ from eitskin_reference.constants_table import (
     MAX_RISE,
     MAX_STEP_HALVINGS,
     PRUNE_EVERY,
-    ZERO_GAP,
 )
 from eitskin_reference.problem import (
     Certificate,
@@ -66,7 +65,7 @@ def fista(
             continue
         certificate = check_gap(s, y, x, sx, lam, sign, basis)
         if not certificate.objective <= scale * (1 + MAX_RISE) or (
-            none and certificate.gap > ZERO_GAP * scale
+            none and certificate.gap > MAX_RISE * scale
         ):
             if halvings == MAX_STEP_HALVINGS or last:
                 stop = "diverged"

@@ -7,10 +7,10 @@ from eitskin.arrays import BoolArray, FloatArray
 from eitskin_reference.constants_table import (
     DRIFT_CLEAR,
     DRIFT_UNEXPLAINED,
-    FOLLOW_GAIN,
-    FOLLOW_LEFT,
-    FOLLOW_PARTS,
-    FOLLOW_TOUCH,
+    REFERENCE_TRACKING_GAIN,
+    REFERENCE_TRACKING_LEFT,
+    REFERENCE_TRACKING_PARTS,
+    REFERENCE_TRACKING_TOUCH,
 )
 from eitskin_reference.problem import orthonormal, project
 
@@ -33,7 +33,7 @@ class Follower:
 
     @property
     def _apart(self) -> int:
-        return self.frames // FOLLOW_PARTS
+        return self.frames // REFERENCE_TRACKING_PARTS
 
     @property
     def follows(self) -> bool:
@@ -88,7 +88,7 @@ class Follower:
         its |y|^2 the best column has."""
         if not self._level > 0:
             self._level = lambda_max
-        if match > FOLLOW_TOUCH:
+        if match > REFERENCE_TRACKING_TOUCH:
             return None
         share = max(1, self._apart) / self.frames
         return np.asarray(v0 + min(1.0, share) * (mean - v0))
@@ -100,7 +100,7 @@ class Follower:
         if self._means == 1:
             self._gain = gain
         by, frames = gain - self._gain, max(1, self._apart)
-        if 4 * self._means * frames <= self.frames or not 0 < abs(by) < FOLLOW_GAIN:
+        if 4 * self._means * frames <= self.frames or not 0 < abs(by) < REFERENCE_TRACKING_GAIN:
             return None
         return np.asarray(v0 + by * v0)
 
@@ -108,5 +108,7 @@ class Follower:
 def gain_beside(u: FloatArray, y: FloatArray, columns: FloatArray) -> float:
     """How much of ``y`` (r,) is ``u`` (r,), beside what ``columns`` (r, k) give; 0 where they may
     give all of it."""
-    left = project(u, orthonormal(columns.T, len(u), FOLLOW_LEFT))
-    return float(left @ y / (left @ left)) if left @ left > FOLLOW_LEFT * (u @ u) else 0.0
+    left = project(u, orthonormal(columns.T, len(u), REFERENCE_TRACKING_LEFT))
+    return (
+        float(left @ y / (left @ left)) if left @ left > REFERENCE_TRACKING_LEFT * (u @ u) else 0.0
+    )

@@ -18,10 +18,10 @@ from eitskin.errors import FrameError
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin_reference.constants_table import (
-    FAR_REGULARISATION,
     FOLD_ROUNDING,
     MAX_OF_NOISE,
     MAX_RATIO,
+    MAX_REGULARISATION,
     MIN_REFERENCE_FRAMES,
     NOISE_ROUNDING,
     RATIO_DEFINED,
@@ -339,10 +339,9 @@ class FrameStage:
 
     def _leave_out(self, known: BoolArray) -> None:
         """Whiten again for the folded rows (k,) that are known, and for the noise."""
-        asked = max(
-            self.options.regularisation_noise_factor * self._noise_v / self._v0_rms,
-            FAR_REGULARISATION if self._far else 0.0,
-        )
+        asked = self.options.regularisation_noise_factor * self._noise_v / self._v0_rms
+        if self._far:
+            asked = MAX_REGULARISATION
         self._whitening = (
             filled(self.model, known) if self._form is None else whiten(self._form, known, asked)
         )

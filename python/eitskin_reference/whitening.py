@@ -9,13 +9,11 @@ from eitskin.arrays import BoolArray, FloatArray
 from eitskin.model.model import Model
 from eitskin_reference.constants_table import (
     LOST,
-    LOST_PIVOT,
     MAX_REGULARISATION,
     MIN_REGULARISATION,
     MIN_REGULARISATION_FRACTION,
     NOISE_POWER,
     NOISE_PROBES,
-    REGULARISATION_KEPT,
     REST_POWER,
     STEP_MARGIN,
 )
@@ -96,7 +94,7 @@ def filled(model: Model, known: BoolArray) -> Whitening | None:
         precision[np.ix_(out, out)], precision[np.ix_(out, known)]
     )
     left = np.eye(model.rank) - p @ np.linalg.solve(precision[np.ix_(out, out)], p.T)
-    see = _upper_factor(left, LOST_PIVOT * LOST**2)
+    see = _upper_factor(left, LOST**2)
     return Whitening(see, np.asarray(np.linalg.inv(see.T)), 1.0, 0.0, fill=fill)
 
 
@@ -104,7 +102,7 @@ def whiten(form: WhitenedForm, known: BoolArray, asked: float) -> Whitening | No
     """The whitening of the folded rows where ``known`` (k,), the noise asking for a regularisation
     of at least ``asked`` for all of them: None for the model's own."""
     least = min(asked, MAX_REGULARISATION)
-    of_all = least if least > REGULARISATION_KEPT * form.regularisation else form.regularisation
+    of_all = max(least, form.regularisation)
     if not known.all():
         left = float(known.mean())
         regularisation = max(

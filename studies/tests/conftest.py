@@ -4,9 +4,7 @@ import fcntl
 import hashlib
 import json
 import os
-import re
 from collections.abc import Iterator
-from fnmatch import translate
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,7 +21,6 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BUILD = ROOT / "build"
 NEEDED = ("dask", "pyeit", "sklearn", "celer", "daqp", "unicorn", "netgen", "matplotlib")
-LONG = HERE / "long_tests.txt"
 hypothesis.settings.register_profile("fixed", derandomize=True)  # the short tier's
 
 
@@ -32,17 +29,6 @@ def pytest_sessionstart() -> None:
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         raise pytest.UsageError(f"no {', '.join(missing)} here: run  studies/test")
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what ``long_tests.txt`` lists."""
-    lines = LONG.read_text(encoding="utf-8").splitlines()
-    patterns = [translate(line) for line in lines if line and not line.startswith("#")]
-    is_long = re.compile("|".join(patterns)).match
-    for item in items:
-        name = item.nodeid.rpartition("tests/")[2].replace("[", "(").replace("]", ")")
-        if is_long(name):
-            item.add_marker(pytest.mark.long)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -19,6 +19,7 @@ def result(cortex_m7) -> bench_board.BoardCost:
     return bench_board.run(2, 1, frames=0, build=cortex_m7)
 
 
+@pytest.mark.long("test_the_rate_of_the_emulated_board, tests/python/emulated")
 def test_every_storage_by_plain_c_cold_and_warm(result):
     assert [(c.storage, c.kernels, c.warm) for c in result.costs] == [
         (storage, kernels, warm)
@@ -37,6 +38,7 @@ def test_every_storage_by_plain_c_cold_and_warm(result):
     assert sizes == sorted(sizes)
 
 
+@pytest.mark.long("test_the_rate_of_the_emulated_board, tests/python/emulated")
 def test_images(result):
     nucleo, mps2 = result.images
     assert (nucleo.board, mps2.board) == ("nucleo_f767zi", "mps2_an500")
@@ -54,6 +56,7 @@ def test_the_rate_of_the_emulated_board(cortex_m7):
     assert 1000 < rate.stack_used < 16384
 
 
+@pytest.mark.long("test_the_rate_of_the_emulated_board, tests/python/emulated")
 def test_the_page_and_json(result, tmp_path):
     texts, tables = bench_board.for_page(result, "the command")
     assert "`the command`" in texts["board-run"] and set(tables) == {"cost", "images"}

@@ -52,6 +52,7 @@ def lost(rate: dict[str, Any], which: str = "lost") -> float:
     return float(rate[which]["mean"])
 
 
+@pytest.mark.long("tests/python/oracle and hard_cases check diagnostics by their rules")
 def test_what_is_certain_is_counted(result):
     assert len(result["rates"]) == 3 * len(FAULTS) + 2
     assert all(one["scenes"] == SCENES for one in result["rates"])
@@ -72,6 +73,7 @@ def test_what_is_certain_is_counted(result):
     assert {one["effect"] for one in result["imperfect"]} == set(IMPERFECT)
 
 
+@pytest.mark.long("tests/python/oracle and hard_cases check diagnostics by their rules")
 def test_counts_are_those_of_the_frames(result):
     """A detached electrode once more, by hand."""
     model, blob = load_prebuilt()
@@ -98,6 +100,7 @@ def test_intervals():
     assert mean.half_95 == pytest.approx(1.96 * np.sqrt(0.25 * 20 / 19 / 20))
 
 
+@pytest.mark.long("tests/python/oracle and hard_cases check diagnostics by their rules")
 def test_the_page_is_filled_and_has_its_rows(result, page):
     """The fixture's page is a copy of ours; what no command writes stays."""
     written, ours = page.read_text(), (PAGES / page.name).read_text()

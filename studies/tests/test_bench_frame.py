@@ -2,9 +2,12 @@
 them adds up."""
 
 import numpy as np
+import pytest
 
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin_studies.benchmarks.frame import pyeit_frames, run, to_text
+
+pytestmark = pytest.mark.long("the other tests of bench, with fewer peers")
 
 
 def test_all_are_timed_and_said():

@@ -31,7 +31,7 @@ def test_without_pyeit(monkeypatch):
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "pyeit" else found(name)
     )
-    with pytest.raises(MissingExtraError, match=r"pyeit.*eitskin\[peers\]"):
+    with pytest.raises(MissingExtraError, match=r"pyeit.*'./studies\[peers\]'"):
         bench_jacobian.run()
 
 

@@ -33,6 +33,7 @@ def test_the_page_has_the_places(tmp_path):
     assert "23 of 24 contacts" in outputs.as_text(result)
 
 
+@pytest.mark.long("test_the_page_has_the_places, test_a_scene_ends_by_itself; sinks/test_sinks.py")
 def test_a_tap_through_everything():
     result = outputs.run(taps=1, seconds=0.5, load_s=1.0, seed=2)
     assert list(result.parts_ms) == [*PARTS, "contact to tuio"]

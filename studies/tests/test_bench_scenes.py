@@ -2,10 +2,13 @@
 
 import json
 
+import pytest
+
 from eitskin.scene.registry import BUILT_IN
 from eitskin_studies.benchmarks import scenes as bench_scenes
 
 
+@pytest.mark.long("test_the_scenes_table_has_both_ways_and_what_bounds_a_dataset")
 def test_the_effects_table_has_none_each_and_all():
     result = bench_scenes.effects_table(frames=3, rounds=1)
     cases = result["cases"]

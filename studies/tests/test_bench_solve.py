@@ -33,6 +33,7 @@ def test_suboptimality_is_judged_in_float64(problems):
     ).all()  # where no sign differs, equal but for rounding
 
 
+@pytest.mark.long("the other tests of the file, with fewer peers")
 def test_all_that_is_installed_reaches_its_level(problems, monkeypatch):
     monkeypatch.setattr(bench_solve, "LEVELS", (1e-2,))
     seen = set()

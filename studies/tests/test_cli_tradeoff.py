@@ -35,6 +35,7 @@ def done(capsys) -> Callable[[str], str]:
     return run
 
 
+@pytest.mark.long("test_tradeoff_front.py, test_the_recommended_model_is_the_measured_one")
 def test_run_writes_tables_and_pictures(done, tmp_path):
     out = done(f"tradeoff run -o {tmp_path / 'out'} {TINY_RUN} --front {tmp_path / 'small.json'}")
     assert "standard rank 32" in out and "* " in out

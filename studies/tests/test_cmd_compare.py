@@ -18,6 +18,7 @@ def run(*arguments: str) -> int:
     return int(options.run(options))
 
 
+@pytest.mark.long("test_compare.py")
 def test_table_files_and_pictures(tmp_path, capsys):
     files = [tmp_path / name for name in ("scenes.png", "curves.png", "numbers.csv")]
     drawn = ["--picture", str(files[0]), "--curves", str(files[1]), "--csv", str(files[2])]
@@ -31,6 +32,7 @@ def test_table_files_and_pictures(tmp_path, capsys):
     assert files[0].read_bytes()[1:4] == files[1].read_bytes()[1:4] == b"PNG"
 
 
+@pytest.mark.long("test_compare.py")
 def test_json_has_every_method_and_only_json(capsys):
     assert run(*FEW, "--json", "--lookup", "bilinear") == 0
     values = json.loads(capsys.readouterr().out)
@@ -57,6 +59,7 @@ def test_bad_arguments_are_refused_before_the_work(arguments, error, text, capsy
     assert capsys.readouterr().out == ""
 
 
+@pytest.mark.long("test_compare.py")
 def test_own_skin(tmp_path, capsys):
     skin = tmp_path / "skin.toml"
     skin.write_text(

@@ -30,6 +30,8 @@ def test_the_product_knows_the_commands_by_name():
         ("study papper", 2, "study: no experiment is named 'papper'; did you mean 'paper'?"),
         ("study paper --page lost.md", 3, "lost.md: no such page; check the path"),
         ("study paper --page odd.md", 4, "odd.md: not UTF-8 text, so not a page"),
+        ("compare --skin none", 3, "none: no such skin description; check the path"),
+        ("compare --csv no/a.csv", 3, "no/a.csv: the folder no does not exist; make it first"),
         ("bench latency --presses 0", 2, "bench: --presses 0 is out of range; use 1 to 10000"),
     ],
 )
@@ -61,7 +63,7 @@ def test_missing_extras_are_named(package, extra, option, tmp_path):
 
 
 def test_the_checks_of_constants_are_commands_of_ours():
-    tables = load_toml(ROOT / "tables" / "constants.toml", "table")["room"]
+    tables = load_toml(ROOT / "tables" / "constants.toml", "table")["module"]
     files = (ROOT / "studies" / "eitskin_studies" / "cli").glob("bench_*.py")
     benches = "".join(path.read_text(encoding="utf-8") for path in files)
     for group in (group for table in tables for group in table["group"]):

@@ -15,7 +15,10 @@ def test_every_effect_has_a_picture():
     assert set(SHOWN) == set(SKETCHES) == set(BUILT_IN)
 
 
-@pytest.mark.parametrize("name", ["background", "phase", "bridged"])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param("background", marks=pytest.mark.long("two other effects")), "phase", "bridged"],
+)
 def test_pictures_are_drawn_small_and_the_same_again(name, tmp_path):
     for run in ("first", "second"):
         draw_effect(tmp_path / run, name)

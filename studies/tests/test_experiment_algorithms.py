@@ -23,6 +23,8 @@ from eitskin_studies.experiments.algorithms.scenes import NUMBERS, shown_set, to
 from eitskin_studies.experiments.experiment import ExperimentOutcome
 from study_pages import coarse, fills_its_page, goes_on, workspace
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 KEPT = (
     *("Gauss-Newton (Tikhonov)", "NOSER", "conjugate gradient", "GREIT-like"),
     *(f"plain FISTA {iterations}, non-negative" for iterations in (30, 300, 3000)),

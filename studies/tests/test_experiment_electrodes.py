@@ -17,6 +17,8 @@ from eitskin_studies.experiments import electrodes
 from eitskin_studies.experiments.electrodes import measuring, patterns, tables, tuning
 from study_pages import coarse, fills_its_page, goes_on
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 
 @pytest.mark.parametrize("pattern", list(patterns.PATTERNS))
 def test_every_pattern_comes_out_of_the_transfer_matrix(pattern):

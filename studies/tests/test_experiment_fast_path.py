@@ -1,8 +1,12 @@
 """The study of the fast path: it fills its page."""
 
+import pytest
+
 from eitskin_studies.experiments import fast_path
 from eitskin_studies.experiments.fast_path import adaptive, beyond
 from study_pages import fills_its_page, workspace
+
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
 
 
 def test_it_fills_its_page(tmp_path, monkeypatch):

@@ -22,6 +22,8 @@ from eitskin_studies.experiments.force.readouts import (
 from eitskin_studies.experiments.write import to_json
 from study_pages import coarse, fills_its_page, goes_on
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory) -> tuple[Path, ExperimentOutcome]:

@@ -21,6 +21,8 @@ from eitskin_studies.experiments.homogeneous.uniformity import (
 )
 from study_pages import fills_its_page, goes_on, workspace
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 PROTOCOL = adjacent(16)
 ROWS = PROTOCOL.drive_measure.astype(np.int64)
 EVEN_V = predicted(paper_skin(), 16).voltages(ROWS, 1e-3)

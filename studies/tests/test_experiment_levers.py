@@ -11,6 +11,8 @@ from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES
 from eitskin_studies.experiments.levers.measure import COUNTED, IMAGE_SNRS_DB, RANDOM
 from study_pages import coarse, fills_its_page, goes_on
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory) -> tuple[Path, ExperimentOutcome]:

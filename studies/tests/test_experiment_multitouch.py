@@ -37,6 +37,8 @@ from eitskin_studies.experiments.multitouch.counts import auc, quantile, roc, sc
 from eitskin_studies.experiments.multitouch.variants import VARIANTS, SeenFrame
 from study_pages import coarse, fills_its_page, goes_on, workspace
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 OUTLINE = paper_skin().outline
 
 

@@ -19,6 +19,8 @@ from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
 from eitskin_studies.worlds.worlds import WORLDS
 from study_pages import fills_its_page, goes_on, workspace
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 
 def _run(folder: Path) -> ExperimentOutcome:
     with pytest.MonkeyPatch.context() as patch:

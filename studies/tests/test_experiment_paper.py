@@ -9,6 +9,8 @@ from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import paper
 from study_pages import coarse, fills_its_page, goes_on
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 
 @pytest.mark.parametrize("from_rim_mm", paper.READINGS.values())
 def test_weights_stand_where_the_skin_is_most_sensitive(from_rim_mm, monkeypatch):

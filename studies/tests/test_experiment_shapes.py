@@ -26,6 +26,8 @@ from eitskin_studies.experiments.shapes.rounded import as_outline
 from eitskin_studies.experiments.shapes.variants import ShapeVariant, variants
 from study_pages import coarse, fills_its_page, goes_on, workspace
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory) -> dict[str, ShapeVariant]:

@@ -39,6 +39,8 @@ from eitskin_studies.experiments.tank.tanks import (
 )
 from study_pages import fills_its_page, goes_on, workspace
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "tank_kit4.toml"
 
 

@@ -21,6 +21,8 @@ from eitskin_studies.experiments.tracking.streams import (
 )
 from study_pages import fills_its_page, goes_on, workspace
 
+pytestmark = pytest.mark.long("test_experiments.py, and the experiments belief and deformation")
+
 
 @pytest.fixture
 def small(tmp_path, monkeypatch) -> Workspace:

@@ -27,6 +27,10 @@ from eitskin_studies.tradeoff.run import RESULTS, RunSettings, run
 from eitskin_studies.tradeoff.scene_sets import SETS, SceneFactory
 from eitskin_studies.tradeoff.table import best_points, to_csv, to_text
 
+pytestmark = pytest.mark.long(
+    "test_tradeoff_front.py, test_the_recommended_model_is_the_measured_one"
+)
+
 SKIN, ELEMENTS = paper_skin(), 1200
 TINY = RunSettings(6, 4, 2, ("pairs", "drift"), (40.0, 60.0), 5, ELEMENTS, 0, 2, 1, 2, False)
 WARM = {"warm_start": True, "scan": "reciprocal", "storage": "i8"}

@@ -68,10 +68,14 @@ static inline void check_equal(long long got, long long want, const char *file, 
 #define CHECK_OK(call)      CHECK_EQUAL(call, EITS_OK)
 #define CHECK_REFUSED(call) CHECK_EQUAL(call, EITS_E_ARGUMENT)
 
-/* From here on failures say this of their case, until another or the test's end. A loop over a
- * table, for (size_t k = 0; IN_TABLE(k, cases); ++k), says the row's number. */
-#define CASE(name)        (checks_case = (name))
-#define COUNT_OF(list)    (sizeof(list) / sizeof(list)[0])
+/* From here on failures say this of their case, until another or the test's end. EACH_ROW goes
+ * through a table whose rows begin with a name, and failures say the row's; a loop over other
+ * tables, for (size_t k = 0; IN_TABLE(k, cases); ++k), says the row's number. */
+#define CASE(name)     (checks_case = (name))
+#define COUNT_OF(list) (sizeof(list) / sizeof(list)[0])
+#define EACH_ROW(row, rows)                         \
+    for (const __typeof__((rows)[0]) *row = (rows); \
+         row < (rows) + COUNT_OF(rows) ? (CASE(row->name), 1) : (CASE(""), 0); ++row)
 #define IN_TABLE(k, list) ((checks_number = (k) < COUNT_OF(list) ? (long)(k) : -1) >= 0)
 
 static inline int checks_report(const char *name)

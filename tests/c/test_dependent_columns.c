@@ -27,19 +27,34 @@ static void check_result(const dense_bench *b, double max)
 /* Another solver's coefficients to start from, and less and less to spend. */
 TEST(every_limit_beside_columns_that_depend)
 {
-    static const double offs[] = {0, 1e-7, 1e-4, 3e-3};
-    for (int way = 0; way < 16; ++way) {
-        eits_context *ctx = set_up(&b, offs[way % 4]);
+    static const struct {
+        const char *name;
+        double off; /* by which columns that depend differ */
+        eits_sign sign;
+        double lambda;
+        uint32_t warm;
+    } rows[] = {
+        {"equal, increase, cold", 0, EITS_SIGN_INCREASE, 0.1, 0},
+        {"equal, both, warm", 0, EITS_SIGN_BOTH, 0.001, 1},
+        {"off by rounding, increase, warm", 1e-7, EITS_SIGN_INCREASE, 0.001, 1},
+        {"off by rounding, both, cold", 1e-7, EITS_SIGN_BOTH, 0.1, 0},
+        {"nearly equal, increase, cold", 1e-4, EITS_SIGN_INCREASE, 0.001, 0},
+        {"nearly equal, both, warm", 1e-4, EITS_SIGN_BOTH, 0.1, 1},
+        {"alike, increase, warm", 3e-3, EITS_SIGN_INCREASE, 0.1, 1},
+        {"alike, both, cold", 3e-3, EITS_SIGN_BOTH, 0.001, 0},
+    };
+    EACH_ROW(row, rows) {
+        eits_context *ctx = set_up(&b, row->off);
         eits_options o = *eits_get_options(ctx);
-        o.sign = way / 4 % 2 ? EITS_SIGN_BOTH : EITS_SIGN_INCREASE;
-        o.lambda_rel = R(way % 2 ? 0.001 : 0.1);
+        o.sign = row->sign;
+        o.lambda_rel = (eits_real)row->lambda;
         o.iterations = 30;
         for (uint32_t limit = 40; limit < 12000; limit += 1 + limit / 60) {
             small_new_data(ctx, 81);
             eits_forget(ctx);
             o.mac_limit = 0;
             o.solver = EITS_SOLVER_FISTA;
-            o.warm_start = way >= 8;
+            o.warm_start = row->warm;
             CHECK_OK(eits_set_options(ctx, &o));
             CHECK_OK(eits_solve(ctx, NULL));
             ctx->frame.y[limit % RANK] += R(0.4);
@@ -87,18 +102,53 @@ TEST(starts_that_cancel)
     free(y);
 }
 
+/* Without a penalty the first round already fails on these data: FISTA would go on, but no
+ * iteration is left. */
+TEST(a_round_that_fails_at_the_last_iteration)
+{
+    eits_context *ctx = set_up(&b, 3e-3);
+    CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_ACTIVE_SET, o.sign = EITS_SIGN_BOTH,
+                   o.lambda_rel = o.lambda_noise_factor = 0, o.iterations = 1);
+    small_new_data(ctx, 83);
+    ctx->frame.y[1] += R(0.4);
+    double *y = dense_copy(ctx->frame.y, RANK);
+    CHECK_OK(eits_solve(ctx, NULL));
+    CHECK_EQUAL(ctx->info.stop, EITS_STOP_ITERATIONS);
+    CHECK_EQUAL(ctx->info.iterations, 1);
+    check_result(&b, 0.5 * dense_dot(y, y, RANK));
+    free(y);
+}
+
 /* The optimum to rounding, in few rounds. */
 TEST(the_active_set_ends_soon)
 {
     enum { RANK_HERE = 12, ROUNDS = 25 };
-    static const double lambdas[] = {0.003, 0.03, 0.3};
-    for (int way = 0; way < 36; ++way) {
-        eits_context *ctx = dense_bench_open(
-            &b, (small_spec){.rank = RANK_HERE, .side = 9, .storage = (eits_storage)(way / 9)},
-            way % 2);
-        small_new_data(ctx, 85 + (uint64_t)way);
-        CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_ACTIVE_SET, o.sign = (eits_sign)(way / 3 % 3),
-                       o.iterations = ROUNDS, o.lambda_rel = (eits_real)lambdas[way % 3]);
+    static const struct {
+        const char *name;
+        eits_storage storage;
+        eits_sign sign;
+        double lambda;
+    } rows[] = {
+        {"f32, increase, many columns", EITS_STORAGE_F32, EITS_SIGN_INCREASE, 0.003},
+        {"f32, decrease, some columns", EITS_STORAGE_F32, EITS_SIGN_DECREASE, 0.03},
+        {"f32, both, few columns", EITS_STORAGE_F32, EITS_SIGN_BOTH, 0.3},
+        {"f16, increase, some columns", EITS_STORAGE_F16, EITS_SIGN_INCREASE, 0.03},
+        {"f16, decrease, few columns", EITS_STORAGE_F16, EITS_SIGN_DECREASE, 0.3},
+        {"f16, both, many columns", EITS_STORAGE_F16, EITS_SIGN_BOTH, 0.003},
+        {"i16, increase, few columns", EITS_STORAGE_I16, EITS_SIGN_INCREASE, 0.3},
+        {"i16, decrease, many columns", EITS_STORAGE_I16, EITS_SIGN_DECREASE, 0.003},
+        {"i16, both, some columns", EITS_STORAGE_I16, EITS_SIGN_BOTH, 0.03},
+        {"i8, increase, many columns", EITS_STORAGE_I8, EITS_SIGN_INCREASE, 0.003},
+        {"i8, decrease, some columns", EITS_STORAGE_I8, EITS_SIGN_DECREASE, 0.03},
+        {"i8, both, few columns", EITS_STORAGE_I8, EITS_SIGN_BOTH, 0.3},
+    };
+    uint64_t seed = 85;
+    EACH_ROW(row, rows) {
+        const small_spec spec = {.rank = RANK_HERE, .side = 9, .storage = row->storage};
+        eits_context *ctx = dense_bench_open(&b, spec, (int)(seed % 2));
+        small_new_data(ctx, seed++);
+        CHANGE_OPTIONS(ctx, o.solver = EITS_SOLVER_ACTIVE_SET, o.sign = row->sign,
+                       o.iterations = ROUNDS, o.lambda_rel = (eits_real)row->lambda);
         CHECK_OK(eits_solve(ctx, NULL));
         CHECK_EQUAL(ctx->info.stop, EITS_STOP_OPTIMUM);
         CHECK(ctx->info.iterations < ROUNDS && ctx->info.nonzeros <= RANK_HERE);

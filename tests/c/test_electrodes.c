@@ -1,46 +1,56 @@
 /* Open electrodes, bridged pairs, dead front ends, and rows that the model cannot give. */
 #include "spoiled_frame.h"
 
-/* Zero, NaN or saturated: all rows of an electrode tell that it is open, and are left out; one that
- * lives, and it is not: of those that drive with it, where they are zero. */
+static const struct dead {
+    const char *name;
+    double value;
+    int saturated;
+} DEAD[] = {{"zero", 0, 0}, {"no number", NAN, 0}, {"saturated", -2.5, 1}};
+
+/* All rows of electrode e read as `dead`: it is open, and they are left out. */
+static void check_open(const struct dead *dead, uint32_t e)
+{
+    eits_context *ctx = set_up(&b, 1);
+    const int zero = dead->value == 0;
+    look_for(ctx, EITS_DIAGNOSTICS_ALL);
+    CHANGE_OPTIONS(ctx, o.saturation_v = 2);
+    uint32_t count = 0, last = 0;
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
+        if (!row_uses(ctx, i, e))
+            continue;
+        b.frame[i] = (eits_real)dead->value;
+        ++count;
+        last = !zero || row_drives(ctx, i, e) ? i : last;
+    }
+    reconstruct(&b);
+    CHECK_EQUAL(ctx->info.masked, count);
+    CHECK_EQUAL(ctx->info.open_electrodes, 1u << e);
+    CHECK_EQUAL(ctx->info.diagnostics & (EITS_DIAGNOSTIC_ELECTRODE_OPEN | EITS_DIAGNOSTIC_BRIDGED),
+                EITS_DIAGNOSTIC_ELECTRODE_OPEN);
+    CHECK_EQUAL(ctx->info.saturated, dead->saturated ? count : 0);
+    CHECK((ctx->info.diagnostics & EITS_DIAGNOSTIC_SATURATED) != 0 || !dead->saturated);
+    for (uint32_t k = 0; k < SMALL_ELECTRODES; ++k)
+        CHECK_EQUAL(ctx->rows.electrode[k], k == e ? EITS_ELECTRODE_OPEN : 0);
+    for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+        CHECK((ctx->rows.unusable[i] & EITS_ROW_OPEN) != 0 || !row_uses(ctx, i, e));
+    CHECK_EQUAL(ctx->rows.unusable[SMALL_ROWS], 0); /* no row */
+    /* one row that lives, and the electrode is not open: where they are zero, one that it drives */
+    const eits_real kept = b.frame[last];
+    b.frame[last] = ctx->reference.v0[last];
+    reconstruct(&b);
+    CHECK_EQUAL(ctx->info.open_electrodes, 0);
+    CHECK_EQUAL(ctx->rows.electrode[e] & EITS_ELECTRODE_OPEN, 0);
+    b.frame[last] = kept;
+    look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_OPEN);
+    reconstruct(&b);
+    CHECK_EQUAL(ctx->info.open_electrodes, 0);
+}
+
 TEST(open_electrodes_are_named_and_left_out)
 {
-    for (int kind = 0; kind < 3; ++kind) {
-        for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e) {
-            eits_context *ctx = set_up(&b, 1);
-            look_for(ctx, EITS_DIAGNOSTICS_ALL);
-            CHANGE_OPTIONS(ctx, o.saturation_v = 2);
-            uint32_t count = 0, last = 0;
-            for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
-                if (!row_uses(ctx, i, e))
-                    continue;
-                b.frame[i] = kind == 0 ? 0 : (kind == 1 ? R(NAN) : R(-2.5));
-                ++count;
-                last = kind > 0 || row_drives(ctx, i, e) ? i : last;
-            }
-            reconstruct(&b);
-            CHECK_EQUAL(ctx->info.masked, count);
-            CHECK_EQUAL(ctx->info.open_electrodes, 1u << e);
-            CHECK_EQUAL(ctx->info.diagnostics &
-                            (EITS_DIAGNOSTIC_ELECTRODE_OPEN | EITS_DIAGNOSTIC_BRIDGED),
-                        EITS_DIAGNOSTIC_ELECTRODE_OPEN);
-            CHECK_EQUAL(ctx->info.saturated, kind == 2 ? count : 0);
-            CHECK((ctx->info.diagnostics & EITS_DIAGNOSTIC_SATURATED) != 0 || kind != 2);
-            for (uint32_t k = 0; k < SMALL_ELECTRODES; ++k)
-                CHECK_EQUAL(ctx->rows.electrode[k], k == e ? EITS_ELECTRODE_OPEN : 0);
-            for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-                CHECK((ctx->rows.unusable[i] & EITS_ROW_OPEN) != 0 || !row_uses(ctx, i, e));
-            CHECK_EQUAL(ctx->rows.unusable[SMALL_ROWS], 0); /* no row */
-            const eits_real dead = b.frame[last];
-            b.frame[last] = ctx->reference.v0[last];
-            reconstruct(&b);
-            CHECK_EQUAL(ctx->info.open_electrodes, 0);
-            CHECK_EQUAL(ctx->rows.electrode[e] & EITS_ELECTRODE_OPEN, 0);
-            b.frame[last] = dead;
-            look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_ELECTRODE_OPEN);
-            reconstruct(&b);
-            CHECK_EQUAL(ctx->info.open_electrodes, 0);
-        }
+    EACH_ROW(dead, DEAD) {
+        for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e)
+            check_open(dead, e);
     }
 }
 
@@ -95,28 +105,40 @@ TEST(noise_alone)
     }
 }
 
-/* Dead below 2 % of the reference or 5 times the noise; a row whose reference is small tells
- * nothing either way. */
+/* Dead below 2 % of the reference or 5 times the noise; a row whose reference is small says nothing
+ * either way. Electrode 6 has the dead rows; those that it shares with electrode 2 have the
+ * reference `shared`, where others have 1, and stay as they are where that is small. */
 TEST(what_a_dead_row_is)
 {
-    for (int way = 0; way < 6; ++way) {
+    static const struct {
+        const char *name;
+        double fraction; /* of the reference that is left on the rows of electrode 6 */
+        double noise_v;
+        double shared;
+        int open;
+    } rows[] = {
+        {"1.5 % is dead", 0.015, 0, 1, 1},
+        {"2.5 % is not", 0.025, 0, 1, 0},
+        {"2.8 % at 0.6 % noise is dead", 0.028, 0.006, 1, 1},
+        {"3.3 % at 0.6 % noise is not", 0.033, 0.006, 1, 0},
+        {"rows that live, of 0.4, count", 0, 0, 0.4, 0},
+        {"rows that live, of 0.2, do not", 0, 0, 0.2, 1},
+    };
+    EACH_ROW(row, rows) {
         eits_context *ctx = set_up(&b, 0);
-        const eits_real fraction = way < 2 ? (way ? R(0.025) : R(0.015)) : 0,
-                        small = way == 4 ? R(0.4) : R(0.2);
+        const int small = row->shared < 1;
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-            b.frame[i] = (row_uses(ctx, i, 2) && row_uses(ctx, i, 6) && way >= 4 ? small : R(1)) *
+            b.frame[i] = (eits_real)(row_uses(ctx, i, 2) && row_uses(ctx, i, 6) ? row->shared : 1) *
                          (b.frame[i] < 0 ? R(-1) : R(1));
         CHECK_OK(eits_reference_set(ctx, b.frame, SMALL_ROWS));
         look_for(ctx, EITS_DIAGNOSTIC_ELECTRODE_OPEN);
-        /* as though it had been learned */
-        ctx->reference.noise_v = way == 2 || way == 3 ? R(0.006) : 0;
+        ctx->reference.noise_v = (eits_real)row->noise_v; /* as though it had been learned */
         for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
-            if (row_uses(ctx, i, 6) && (way < 4 || !row_uses(ctx, i, 2)))
-                b.frame[i] = way == 2 || way == 3 ? (way == 2 ? R(0.028) : R(0.033)) * b.frame[i]
-                                                  : fraction * b.frame[i];
+            if (row_uses(ctx, i, 6) && !(small && row_uses(ctx, i, 2)))
+                b.frame[i] *= (eits_real)row->fraction;
         }
         reconstruct(&b);
-        CHECK_EQUAL(ctx->info.open_electrodes, way == 1 || way == 3 || way == 4 ? 0 : 1u << 6);
+        CHECK_EQUAL(ctx->info.open_electrodes, row->open ? 1u << 6 : 0);
     }
 }
 

@@ -42,15 +42,33 @@ static void check_gap(const eits_context *ctx, double max_rel)
     free(x), free(y);
 }
 
+/* Each storage with each sign, each lambda with each sign; with panels and without. */
 TEST(it_reaches_the_optimum)
 {
-    static const double lambdas[] = {1e-3, 0.03, 0.5, 0.999};
-    for (int way = 0; way < 4 * 3 * 4; ++way) {
-        const int storage = way / 12, sign = way / 4 % 3, l = way % 4;
+    static const struct {
+        const char *name;
+        eits_storage storage;
+        eits_sign sign;
+        double lambda;
+        int prepared;
+    } rows[] = {
+        {"f32, increase, many columns", EITS_STORAGE_F32, EITS_SIGN_INCREASE, 1e-3, 0},
+        {"f32, decrease, some columns", EITS_STORAGE_F32, EITS_SIGN_DECREASE, 0.03, 1},
+        {"f32, both, few columns", EITS_STORAGE_F32, EITS_SIGN_BOTH, 0.5, 0},
+        {"f16, increase, some columns", EITS_STORAGE_F16, EITS_SIGN_INCREASE, 0.03, 1},
+        {"f16, decrease, few columns", EITS_STORAGE_F16, EITS_SIGN_DECREASE, 0.5, 0},
+        {"f16, both, one column", EITS_STORAGE_F16, EITS_SIGN_BOTH, 0.999, 1},
+        {"i16, increase, few columns", EITS_STORAGE_I16, EITS_SIGN_INCREASE, 0.5, 0},
+        {"i16, decrease, one column", EITS_STORAGE_I16, EITS_SIGN_DECREASE, 0.999, 1},
+        {"i16, both, many columns", EITS_STORAGE_I16, EITS_SIGN_BOTH, 1e-3, 0},
+        {"i8, increase, one column", EITS_STORAGE_I8, EITS_SIGN_INCREASE, 0.999, 1},
+        {"i8, decrease, many columns", EITS_STORAGE_I8, EITS_SIGN_DECREASE, 1e-3, 0},
+        {"i8, both, some columns", EITS_STORAGE_I8, EITS_SIGN_BOTH, 0.03, 1},
+    };
+    EACH_ROW(row, rows) {
         eits_context *ctx = set_up(
-            &b, (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage}, l % 2);
-        const eits_info info =
-            solve(ctx, EITS_SOLVER_ACTIVE_SET, MANY, (eits_sign)sign, lambdas[l], 0);
+            &b, (small_spec){.rank = RANK, .side = SIDE, .storage = row->storage}, row->prepared);
+        const eits_info info = solve(ctx, EITS_SOLVER_ACTIVE_SET, MANY, row->sign, row->lambda, 0);
         CHECK_EQUAL(info.stop, EITS_STOP_OPTIMUM);
         CHECK(info.nonzeros >= 1 && info.nonzeros <= RANK);
         check_gap(ctx, BOTH_WIDTHS(2e-6, 1e-14));
@@ -84,16 +102,29 @@ TEST(the_support_reaches_the_rank)
  * neighbours. */
 TEST(columns_that_depend)
 {
-    static const double lambdas[] = {1e-4, 0.02, 0.3};
-    for (int way = 0; way < 2 * 3 * 3; ++way) {
-        const int near = way / 9, sign = way / 3 % 3, l = way % 3;
+    static const struct {
+        const char *name;
+        double off; /* by which columns that depend differ */
+        eits_sign sign;
+        double lambda;
+        int prepared;
+    } rows[] = {
+        {"equal, increase, many columns", 0, EITS_SIGN_INCREASE, 1e-4, 0},
+        {"equal, decrease, some columns", 0, EITS_SIGN_DECREASE, 0.02, 1},
+        {"equal, both, few columns", 0, EITS_SIGN_BOTH, 0.3, 0},
+        {"equal, both, many columns", 0, EITS_SIGN_BOTH, 1e-4, 0},
+        {"nearly equal, increase, some columns", 1e-4, EITS_SIGN_INCREASE, 0.02, 1},
+        {"nearly equal, decrease, few columns", 1e-4, EITS_SIGN_DECREASE, 0.3, 0},
+        {"nearly equal, both, some columns", 1e-4, EITS_SIGN_BOTH, 0.02, 1},
+        {"nearly equal, both, many columns", 1e-4, EITS_SIGN_BOTH, 1e-4, 0},
+    };
+    EACH_ROW(row, rows) {
         small_model made =
             small_model_make((small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = 9});
-        small_model_depend(&made, N, RANK, near ? 1e-4 : 0);
-        eits_context *ctx = dense_bench_take(&b, made, l % 2);
+        small_model_depend(&made, N, RANK, row->off);
+        eits_context *ctx = dense_bench_take(&b, made, row->prepared);
         small_new_data(ctx, 61);
-        const eits_info info =
-            solve(ctx, EITS_SOLVER_ACTIVE_SET, 50000, (eits_sign)sign, lambdas[l], 0);
+        const eits_info info = solve(ctx, EITS_SOLVER_ACTIVE_SET, 50000, row->sign, row->lambda, 0);
         CHECK(info.stop != EITS_STOP_DIVERGED && info.nonzeros >= 1);
         check_gap(ctx, BOTH_WIDTHS(1e-3, 1e-4));
     }
@@ -110,26 +141,56 @@ TEST(few_pixels)
     }
 }
 
-/* Of all solvers: panels or none, portable and fastest kernels. */
+/* Solves on the context and leaves it with its coefficients, image and info. */
+static eits_context *solved(dense_bench *on, eits_storage storage, eits_solver solver, int prepared,
+                            int portable)
+{
+    const small_spec spec = {.rank = RANK, .side = SIDE, .storage = storage};
+    eits_context *ctx = set_up(on, spec, prepared);
+    CHECK_EQUAL(ctx->columns.panels != NULL, prepared);
+    CHECK_OK(eits_use_portable_kernels(ctx, portable));
+    (void)solve(ctx, solver, 60, EITS_SIGN_BOTH, 0.005, 0);
+    CHECK(ctx->info.nonzeros > 0);
+    return ctx;
+}
+
+/* With panels or without, by portable or by the fastest kernels. */
 TEST(same_bits_in_every_layout)
 {
-    for (int way = 0; way < 4 * 4 * SOLVERS; ++way) {
-        static dense_bench first, other;
-        const int layout = way % 4, storage = way / 4 % 4, solver = way / 16;
-        const small_spec spec = {.rank = RANK, .side = SIDE, .storage = (eits_storage)storage};
-        dense_bench *on = layout == 0 ? &first : &other;
-        eits_context *ctx = set_up(on, spec, layout % 2);
-        CHECK_EQUAL(ctx->columns.panels != NULL, layout % 2);
-        CHECK_OK(eits_use_portable_kernels(ctx, layout / 2));
-        (void)solve(ctx, each_solver(solver), 60, EITS_SIGN_BOTH, 0.005, 0);
-        CHECK(ctx->info.nonzeros > 0);
-        CHECK(memcmp(ctx->solver.x, first.c.ctx->solver.x, N * sizeof(eits_real)) == 0);
-        CHECK(memcmp(ctx->solver.image, first.c.ctx->solver.image, N * sizeof(eits_real)) == 0);
-        CHECK(memcmp(&ctx->info, &first.c.ctx->info, sizeof ctx->info) == 0);
-        if (layout != 0)
+    static const struct {
+        const char *name;
+        eits_storage storage;
+        eits_solver solver;
+    } rows[] = {
+        {"FISTA, f32", EITS_STORAGE_F32, EITS_SOLVER_FISTA},
+        {"FISTA, f16", EITS_STORAGE_F16, EITS_SOLVER_FISTA},
+        {"FISTA, i16", EITS_STORAGE_I16, EITS_SOLVER_FISTA},
+        {"FISTA, i8", EITS_STORAGE_I8, EITS_SOLVER_FISTA},
+        {"working set, f32", EITS_STORAGE_F32, EITS_SOLVER_WORKING_SET},
+        {"working set, f16", EITS_STORAGE_F16, EITS_SOLVER_WORKING_SET},
+        {"working set, i16", EITS_STORAGE_I16, EITS_SOLVER_WORKING_SET},
+        {"working set, i8", EITS_STORAGE_I8, EITS_SOLVER_WORKING_SET},
+        {"active set, f32", EITS_STORAGE_F32, EITS_SOLVER_ACTIVE_SET},
+        {"active set, f16", EITS_STORAGE_F16, EITS_SOLVER_ACTIVE_SET},
+        {"active set, i16", EITS_STORAGE_I16, EITS_SOLVER_ACTIVE_SET},
+        {"active set, i8", EITS_STORAGE_I8, EITS_SOLVER_ACTIVE_SET},
+    };
+    EACH_ROW(row, rows) {
+        dense_bench first = {0};
+        const eits_context *plain = solved(&first, row->storage, row->solver, 0, 0);
+        static const struct {
+            int prepared, portable;
+        } layouts[] = {{1, 0}, {0, 1}, {1, 1}};
+        for (size_t l = 0; IN_TABLE(l, layouts); ++l) {
+            dense_bench other = {0};
+            const eits_context *ctx =
+                solved(&other, row->storage, row->solver, layouts[l].prepared, layouts[l].portable);
+            CHECK(memcmp(ctx->solver.x, plain->solver.x, N * sizeof(eits_real)) == 0);
+            CHECK(memcmp(ctx->solver.image, plain->solver.image, N * sizeof(eits_real)) == 0);
+            CHECK(memcmp(&ctx->info, &plain->info, sizeof ctx->info) == 0);
             dense_bench_close(&other);
-        if (layout == 3)
-            dense_bench_close(&first);
+        }
+        dense_bench_close(&first);
     }
 }
 

@@ -12,6 +12,13 @@ typedef struct bench {
 
 static bench b;
 
+static const struct {
+    const char *name;
+    eits_data_kind kind;
+} KINDS[] = {{"differences", EITS_DATA_DIFFERENCE},
+             {"normalised", EITS_DATA_NORMALISED},
+             {"logarithms of ratios", EITS_DATA_LOG_RATIO}};
+
 /* A context with a reference of `gain` times the model's, each channel off by up to 3 %, so that no
  * two reciprocal rows agree; and a frame that differs from it by up to 20 %. */
 static eits_context *set_up(bench *b, eits_data_kind kind, double gain, int project)
@@ -65,107 +72,123 @@ static void check_stage(bench *b, uint32_t masked_expected)
     free(v0);
 }
 
+/* What fold k of frame b.frame gives, by the definition of the kind of data. */
+static double expected_datum(uint32_t k, eits_data_kind kind, double gain)
+{
+    const eits_fold fold = b.on.c.model.fold[k];
+    double sum = 0, used = 0;
+    for (int side = 0; side < 2; ++side) {
+        const uint32_t row = side == 0 ? fold.first : fold.second;
+        if (row == EITS_FOLD_NONE)
+            continue;
+        const double v = (double)b.frame[row], v0 = (double)b.reference[row];
+        const double sign = side == 1 && kind != EITS_DATA_NORMALISED ? fold.sign : 1;
+        sum += sign * (kind == EITS_DATA_DIFFERENCE   ? gain * (v - v0)
+                       : kind == EITS_DATA_NORMALISED ? (v - v0) / v0
+                                                      : gain * v0 * log(v / v0));
+        used += 1;
+    }
+    return sum / used;
+}
+
+/* A reference of `factor` times the model's: the gain takes it up, polarity too. */
+static void check_data(eits_data_kind kind, double factor, int project)
+{
+    eits_context *ctx = set_up(&b, kind, factor, project);
+    check_stage(&b, 0);
+    const double gain = (double)ctx->reference.gain;
+    CHECK_NEAR(gain, 1 / factor, 0.02);
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k)
+        CHECK_NEAR(ctx->frame.d[k], expected_datum(k, kind, gain), 10 * EPS);
+    CHECK_EQUAL(ctx->projection.count, project);
+    /* the option counts from the next frame on */
+    CHANGE_OPTIONS(ctx, o.project_reference = !project);
+    check_stage(&b, 0);
+    CHECK_EQUAL(ctx->projection.count, !project);
+}
+
 TEST(data_of_each_kind)
 {
-    for (int kind = 0; kind < 3; ++kind) {
-        for (int project = 0; project < 2; ++project) {
-            for (int turned = 0; turned < 2; ++turned) { /* polarity: the gain takes it up */
-                eits_context *ctx = set_up(&b, (eits_data_kind)kind, turned ? -0.5 : 2, project);
-                check_stage(&b, 0);
-                const double gain = (double)ctx->reference.gain;
-                CHECK_NEAR(gain, turned ? -2 : 0.5, 0.02);
-                for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
-                    const eits_fold fold = b.on.c.model.fold[k];
-                    double sum = 0, used = 0;
-                    for (int side = 0; side < 2; ++side) {
-                        const uint32_t row = side == 0 ? fold.first : fold.second;
-                        if (row == EITS_FOLD_NONE)
-                            continue;
-                        const double v = (double)b.frame[row], v0 = (double)b.reference[row];
-                        const double sign =
-                            side == 1 && kind != EITS_DATA_NORMALISED ? fold.sign : 1;
-                        sum += sign * (kind == EITS_DATA_DIFFERENCE   ? gain * (v - v0)
-                                       : kind == EITS_DATA_NORMALISED ? (v - v0) / v0
-                                                                      : gain * v0 * log(v / v0));
-                        used += 1;
-                    }
-                    CHECK_NEAR(ctx->frame.d[k], sum / used, 10 * EPS);
-                }
-                CHECK_EQUAL(ctx->projection.count, project);
-                /* the option counts from the next frame on */
-                CHANGE_OPTIONS(ctx, o.project_reference = !project);
-                check_stage(&b, 0);
-                CHECK_EQUAL(ctx->projection.count, !project);
-            }
-        }
+    EACH_ROW(row, KINDS) {
+        check_data(row->kind, 2, 0);
+        check_data(row->kind, 2, 1);
+        check_data(row->kind, -0.5, 0);
+        check_data(row->kind, -0.5, 1);
     }
+}
+
+/* |y| of a frame that is its reference, all rows off by the same fraction. */
+static double size_of_drift(eits_data_kind kind, double drift, int project)
+{
+    eits_context *ctx = set_up(&b, kind, 1.7, project);
+    for (int i = 0; i < SMALL_ROWS; ++i)
+        b.frame[i] = b.reference[i] * (eits_real)(1 + drift);
+    STAGE(ctx, b.frame);
+    double *y = dense_copy(ctx->frame.y, RANK);
+    const double size = sqrt(dense_dot(y, y, RANK));
+    free(y);
+    return size;
 }
 
 TEST(drift_of_the_gain)
 {
     static const double drifts[] = {1e-3, 0.05, -0.3, 0.8};
-    for (int kind = 0; kind < 3; ++kind) {
+    EACH_ROW(row, KINDS) {
         for (size_t e = 0; IN_TABLE(e, drifts); ++e) {
-            double size[2];
-            for (int project = 0; project < 2; ++project) {
-                eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1.7, project);
-                for (int i = 0; i < SMALL_ROWS; ++i)
-                    b.frame[i] = b.reference[i] * (eits_real)(1 + drifts[e]);
-                STAGE(ctx, b.frame);
-                double *y = dense_copy(ctx->frame.y, RANK);
-                size[project] = sqrt(dense_dot(y, y, RANK));
-                free(y);
-            }
-            CHECK(size[0] > 0.5 * fabs(drifts[e]));
-            CHECK(size[1] <= 30 * EPS * (1 + fabs(drifts[e])));
+            CHECK(size_of_drift(row->kind, drifts[e], 0) > 0.5 * fabs(drifts[e]));
+            CHECK(size_of_drift(row->kind, drifts[e], 1) <= 30 * EPS * (1 + fabs(drifts[e])));
         }
     }
 }
 
 /* What is no number or saturated is left out, counted, and does not reach the data. */
+static void check_unusable(eits_data_kind kind, int project)
+{
+    eits_context *ctx = set_up(&b, kind, 1, project);
+    const eits_fold pair = b.on.c.model.fold[2], other = b.on.c.model.fold[6],
+                    single = b.on.c.model.fold[20];
+    b.frame[pair.first] = (eits_real)NAN; /* the reciprocal stands in, sign turned */
+    b.out[pair.first] = 1;
+    check_stage(&b, 1);
+    CHECK_EQUAL(ctx->projection.count, project);
+    b.frame[other.second] = (eits_real)-INFINITY;
+    b.out[other.second] = 1;
+    check_stage(&b, 2);
+    CHECK(ctx->rows.unusable[pair.first] && ctx->rows.unusable[other.second] &&
+          !ctx->rows.unusable[pair.second]);
+    b.frame[single.first] = (eits_real)INFINITY; /* a row without reciprocal */
+    b.out[single.first] = 1;
+    check_stage(&b, 3);
+    CHECK_EQUAL(ctx->projection.count, 1 + project);
+    b.frame[pair.second] = (eits_real)NAN; /* now both of a pair */
+    b.out[pair.second] = 1;
+    check_stage(&b, 4);
+    CHECK_EQUAL(ctx->projection.count, 2 + project);
+    CHANGE_OPTIONS(ctx, o.saturation_v = 5);
+    b.frame[0] = 5; /* at the limit counts as beyond it */
+    b.frame[1] = R(-5.5);
+    b.out[0] = b.out[1] = 1;
+    check_stage(&b, 6);
+    memset(b.out, 0, sizeof b.out); /* all well again: the basis must be built again */
+    memcpy(b.frame, b.reference, sizeof b.frame);
+    b.frame[3] *= R(1.2);
+    check_stage(&b, 0);
+    CHECK_EQUAL(ctx->projection.count, project);
+}
+
 TEST(unusable_channels)
 {
-    for (int kind = 0; kind < 3; ++kind) {
-        for (int project = 0; project < 2; ++project) {
-            eits_context *ctx = set_up(&b, (eits_data_kind)kind, 1, project);
-            const eits_fold pair = b.on.c.model.fold[2], other = b.on.c.model.fold[6],
-                            single = b.on.c.model.fold[20];
-            b.frame[pair.first] = (eits_real)NAN; /* the reciprocal stands in, sign turned */
-            b.out[pair.first] = 1;
-            check_stage(&b, 1);
-            CHECK_EQUAL(ctx->projection.count, project);
-            b.frame[other.second] = (eits_real)-INFINITY;
-            b.out[other.second] = 1;
-            check_stage(&b, 2);
-            CHECK(ctx->rows.unusable[pair.first] && ctx->rows.unusable[other.second] &&
-                  !ctx->rows.unusable[pair.second]);
-            b.frame[single.first] = (eits_real)INFINITY; /* a row without reciprocal */
-            b.out[single.first] = 1;
-            check_stage(&b, 3);
-            CHECK_EQUAL(ctx->projection.count, 1 + project);
-            b.frame[pair.second] = (eits_real)NAN; /* now both of a pair */
-            b.out[pair.second] = 1;
-            check_stage(&b, 4);
-            CHECK_EQUAL(ctx->projection.count, 2 + project);
-            CHANGE_OPTIONS(ctx, o.saturation_v = 5);
-            b.frame[0] = 5; /* at the limit counts as beyond it */
-            b.frame[1] = R(-5.5);
-            b.out[0] = b.out[1] = 1;
-            check_stage(&b, 6);
-            memset(b.out, 0, sizeof b.out); /* all well again: the basis must be built again */
-            memcpy(b.frame, b.reference, sizeof b.frame);
-            b.frame[3] *= R(1.2);
-            check_stage(&b, 0);
-            CHECK_EQUAL(ctx->projection.count, project);
-        }
+    EACH_ROW(row, KINDS) {
+        check_unusable(row->kind, 0);
+        check_unusable(row->kind, 1);
     }
 }
 
 /* The mask changes from frame to frame in all ways: y is always what a fresh context gives. */
 TEST(changing_masks)
 {
-    for (int kind = 0; kind < 3; ++kind) {
-        eits_context *ctx = set_up(&b, (eits_data_kind)kind, -1.5, 1);
+    EACH_ROW(row, KINDS) {
+        eits_context *ctx = set_up(&b, row->kind, -1.5, 1);
         uint64_t state = 41;
         eits_real good[SMALL_ROWS];
         memcpy(good, b.frame, sizeof good);
@@ -233,36 +256,48 @@ TEST(nothing_left)
     CHECK_EQUAL(ctx->info.masked, SMALL_ROWS);
 }
 
+/* The first `count` rows of the frame become `value`, of turns of sign where that is asked for. */
+static void set_rows(int count, eits_real value, int turns)
+{
+    for (int i = 0; i < count; ++i)
+        b.frame[i] = turns && i % 2 ? -value : value;
+}
+
 TEST(refused_frames_clear_the_image)
 {
+    static const struct {
+        const char *name;
+        int count; /* of rows that are `value` */
+        double value;
+        int turns;
+        size_t length;
+        eits_status expected;
+        uint32_t masked;
+    } refused[] = {
+        {"more missing than may be", 4, NAN, 0, SMALL_ROWS, EITS_E_FRAME_CHANNELS, 4},
+        {"no rows", 0, 0, 0, 0, EITS_E_FRAME_LENGTH, 0},
+        {"a row too few", 0, 0, 0, SMALL_ROWS - 1, EITS_E_FRAME_LENGTH, 0},
+        {"a row too many", 0, 0, 0, SMALL_ROWS + 1, EITS_E_FRAME_LENGTH, 0},
+        {"too large to square", SMALL_ROWS, BOTH_WIDTHS(1e38, 1e307), 1, SMALL_ROWS,
+         EITS_E_NOT_FINITE, 0},
+        {"zeros", SMALL_ROWS, -0.0, 0, SMALL_ROWS, EITS_E_FRAME_ZERO, 0},
+    };
     eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE, 1, 1);
     eits_real image[SIDE * SIDE], again[SIDE * SIDE], good[SMALL_ROWS];
     eits_info info;
     CHANGE_OPTIONS(ctx, o.max_masked = 3);
     memcpy(good, b.frame, sizeof good);
-    static const eits_status expected[] = {EITS_E_FRAME_CHANNELS, EITS_E_FRAME_LENGTH,
-                                           EITS_E_FRAME_LENGTH,   EITS_E_FRAME_LENGTH,
-                                           EITS_E_NOT_FINITE,     EITS_E_FRAME_ZERO};
-    static const size_t length[] = {SMALL_ROWS,     0,          SMALL_ROWS - 1,
-                                    SMALL_ROWS + 1, SMALL_ROWS, SMALL_ROWS};
-    for (int wrong = 0; wrong < 6; ++wrong) {
+    EACH_ROW(row, refused) {
         memcpy(b.frame, good, sizeof good);
         CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, image, &info));
         CHECK(info.nonzeros > 0 && info.iterations > 0);
-        for (int i = 0; i < SMALL_ROWS; ++i) {
-            if (wrong == 0 && i < 4)
-                b.frame[i] = (eits_real)NAN;
-            if (wrong == 4)
-                b.frame[i] = (eits_real)(BOTH_WIDTHS(1e38, 1e307) * (i % 2 == 0 ? 1 : -1));
-            if (wrong == 5)
-                b.frame[i] = R(-0.0);
-        }
-        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, length[wrong], again, &info), expected[wrong]);
+        set_rows(row->count, (eits_real)row->value, row->turns);
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, row->length, again, &info), row->expected);
         for (int j = 0; j < SIDE * SIDE; ++j)
             CHECK(again[j] == 0 && eits_get_image(ctx)[j] == 0 &&
                   eits_get_coefficients(ctx)[j] == 0);
         CHECK(info.nonzeros == 0 && info.iterations == 0 && info.stop == EITS_STOP_BELOW_THRESHOLD);
-        CHECK_EQUAL(info.masked, wrong == 0 ? 4 : 0);
+        CHECK_EQUAL(info.masked, row->masked);
         uint32_t count = 9;
         CHECK_OK(eits_find_touches(ctx, NULL, 0, &count));
         CHECK_EQUAL(count, 0);
@@ -342,14 +377,20 @@ TEST(ratios_at_their_limits)
     }
     eits_context *ctx = set_up(&b, EITS_DATA_LOG_RATIO, 1, 0);
     const uint32_t row = b.on.c.model.fold[20].first;
-    static const double factors[] = {16, 17, 1e6, -1, 0, 1.0 / 16, 1.0 / 17};
-    static const double ratios[] = {16, 16, 16, 1.0 / 16, 1.0 / 16, 1.0 / 16, 1.0 / 16};
-    for (int f = 0; f < 7; ++f) {
-        b.frame[row] = b.reference[row] * (eits_real)factors[f];
+    static const struct {
+        const char *name;
+        double factor, ratio;
+    } limits[] = {
+        {"the greatest", 16, 16},         {"above it", 17, 16},  {"far above it", 1e6, 16},
+        {"the other sign", -1, 1.0 / 16}, {"zero", 0, 1.0 / 16}, {"the least", 1.0 / 16, 1.0 / 16},
+        {"below it", 1.0 / 17, 1.0 / 16},
+    };
+    EACH_ROW(limit, limits) {
+        b.frame[row] = b.reference[row] * (eits_real)limit->factor;
         uint32_t masked;
         CHECK_OK(stage(&b, &masked));
         CHECK_NEAR(ctx->frame.d[20],
-                   (double)ctx->reference.gain * (double)b.reference[row] * log(ratios[f]),
+                   (double)ctx->reference.gain * (double)b.reference[row] * log(limit->ratio),
                    20 * EPS);
     }
 }
@@ -386,17 +427,21 @@ TEST(directions_that_nearly_agree)
 /* What the two rows of a fold differ by; by less than rounding of their references: nothing. */
 TEST(reciprocals_that_agree)
 {
-    for (int kind = 0; kind < 2; ++kind) {
+    static const struct {
+        const char *name;
+        double off; /* of the second row's reference, in units of the last place */
+        int agree;
+    } rows[] = {{"equal", 0, 1}, {"2 ulp", 2, 1}, {"4 ulp", 4, 1}, {"40 ulp", 40, 0}};
+    for (int kind = EITS_DATA_DIFFERENCE; kind <= EITS_DATA_NORMALISED; ++kind) {
         eits_context *ctx = set_up(&b, (eits_data_kind)kind, 2, 0);
         const eits_fold fold = b.on.c.model.fold[4]; /* sign 1 */
         CHECK_EQUAL(fold.sign, 1);
-        for (int step = 0; step < 4; ++step) {
-            static const double off[] = {0, 2, 4, 40}; /* in units of the last place */
+        EACH_ROW(row, rows) {
             const eits_real v0 = ctx->reference.v0[fold.first];
-            ctx->reference.v0[fold.second] = v0 * (eits_real)(1 + off[step] * EPS);
+            ctx->reference.v0[fold.second] = v0 * (eits_real)(1 + row->off * EPS);
             b.frame[fold.first] = b.frame[fold.second] = R(1.01) * v0;
             STAGE(ctx, b.frame);
-            CHECK((ctx->frame.reciprocity_error[4] == 0) == (step < 3));
+            CHECK((ctx->frame.reciprocity_error[4] == 0) == row->agree);
             CHECK(ctx->frame.reciprocity_error[5] != 0);
         }
     }

@@ -206,12 +206,26 @@ TEST(ending_above_the_start)
 /* Of FISTA and of FISTA on a working set. */
 TEST(step_absurdly_large)
 {
-    static const double factors[] = {1e-4, 1e-12, 1e-36};
-    for (int way = 0; way < 2 * 3 * 3; ++way) {
-        eits_context *ctx = set_up(
-            &b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = factors[way % 3]});
-        CHANGE_OPTIONS(ctx, o.iterations = 1000, o.sign = (eits_sign)(way / 3 % 3),
-                       o.warm_start = 1, o.solver = (eits_solver)(way / 9));
+    static const struct {
+        const char *name;
+        eits_solver solver;
+        eits_sign sign;
+        double factor;
+    } rows[] = {
+        {"FISTA, increase, 1e4 too long", EITS_SOLVER_FISTA, EITS_SIGN_INCREASE, 1e-4},
+        {"FISTA, decrease, 1e12 too long", EITS_SOLVER_FISTA, EITS_SIGN_DECREASE, 1e-12},
+        {"FISTA, both, 1e36 too long", EITS_SOLVER_FISTA, EITS_SIGN_BOTH, 1e-36},
+        {"working set, increase, 1e12 too long", EITS_SOLVER_WORKING_SET, EITS_SIGN_INCREASE,
+         1e-12},
+        {"working set, decrease, 1e36 too long", EITS_SOLVER_WORKING_SET, EITS_SIGN_DECREASE,
+         1e-36},
+        {"working set, both, 1e4 too long", EITS_SOLVER_WORKING_SET, EITS_SIGN_BOTH, 1e-4},
+    };
+    EACH_ROW(row, rows) {
+        eits_context *ctx =
+            set_up(&b, (small_spec){.rank = RANK, .side = SIDE, .lipschitz_factor = row->factor});
+        CHANGE_OPTIONS(ctx, o.iterations = 1000, o.sign = row->sign, o.warm_start = 1,
+                       o.solver = row->solver);
         fill_y(&b, 1, 0.01, 0);
         for (int again = 0; again < 2; ++again) {
             const eits_info info = solve(ctx);

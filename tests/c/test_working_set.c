@@ -57,18 +57,38 @@ static void check_same(const eits_context *a, const eits_context *b)
     CHECK(i->gap == j->gap && i->residual == j->residual && i->lambda == j->lambda);
 }
 
+/* Each storage with each sign, from a start at zero and warm, to other data; with panels and
+ * without. */
 TEST(looking_always_gives_the_bits_of_fista)
 {
-    static const uint32_t counts[] = {1, 2, 11, 60};
-    for (int way = 0; way < 4 * 3 * 2 * 4; ++way) {
-        const int storage = way / 24, sign = way / 8 % 3, prepared = way / 4 % 2, k = way % 4;
+    static const struct {
+        const char *name;
+        eits_storage storage;
+        eits_sign sign;
+        int prepared;
+        uint32_t iterations;
+    } rows[] = {
+        {"f32, increase, one iteration", EITS_STORAGE_F32, EITS_SIGN_INCREASE, 0, 1},
+        {"f32, decrease, two", EITS_STORAGE_F32, EITS_SIGN_DECREASE, 1, 2},
+        {"f32, both, sixty", EITS_STORAGE_F32, EITS_SIGN_BOTH, 0, 60},
+        {"f32, both, sixty, panels", EITS_STORAGE_F32, EITS_SIGN_BOTH, 1, 60},
+        {"f16, increase, two", EITS_STORAGE_F16, EITS_SIGN_INCREASE, 0, 2},
+        {"f16, decrease, sixty", EITS_STORAGE_F16, EITS_SIGN_DECREASE, 1, 60},
+        {"f16, both, eleven", EITS_STORAGE_F16, EITS_SIGN_BOTH, 0, 11},
+        {"i16, increase, sixty", EITS_STORAGE_I16, EITS_SIGN_INCREASE, 1, 60},
+        {"i16, decrease, eleven", EITS_STORAGE_I16, EITS_SIGN_DECREASE, 0, 11},
+        {"i16, both, one", EITS_STORAGE_I16, EITS_SIGN_BOTH, 1, 1},
+        {"i8, increase, eleven", EITS_STORAGE_I8, EITS_SIGN_INCREASE, 0, 11},
+        {"i8, decrease, one", EITS_STORAGE_I8, EITS_SIGN_DECREASE, 1, 1},
+        {"i8, both, two", EITS_STORAGE_I8, EITS_SIGN_BOTH, 0, 2},
+    };
+    static const eits_solver solvers[2] = {EITS_SOLVER_FISTA, EITS_SOLVER_WORKING_SET};
+    EACH_ROW(row, rows) {
         dense_bench b[2] = {0};
-        for (int solver = 0; solver < 2; ++solver) {
-            eits_context *ctx =
-                set_up(&b[solver],
-                       (small_spec){.rank = RANK, .side = SIDE, .storage = (eits_storage)storage},
-                       prepared);
-            eits_options o = with(ctx, (eits_solver)solver, counts[k], (eits_sign)sign, 0.05);
+        for (int k = 0; k < 2; ++k) {
+            const small_spec spec = {.rank = RANK, .side = SIDE, .storage = row->storage};
+            eits_context *ctx = set_up(&b[k], spec, row->prepared);
+            eits_options o = with(ctx, solvers[k], row->iterations, row->sign, 0.05);
             look_always(&o);
             o.warm_start = 1;
             (void)solve(ctx, o);
@@ -107,26 +127,37 @@ TEST(looking_always_recovers_like_fista)
  * iteration touched. */
 TEST(the_optimum_is_that_of_all_columns)
 {
-    for (int sign = 0; sign < 3; ++sign) {
-        for (int asked = 0; asked < 2; ++asked) {
-            for (uint32_t every = 1; every <= 50; every += 7) {
-                eits_context *ctx = set_up(&b, RANDOM, (int)(every % 2));
-                eits_options o = with(ctx, EITS_SOLVER_WORKING_SET, asked ? 50000 : 20000,
-                                      (eits_sign)sign, 0.03);
-                o.gap_every = every;
-                o.gap_rel = asked ? R(BOTH_WIDTHS(1e-5, 1e-11)) : 0;
-                const eits_info info = solve(ctx, o);
-                CHECK_EQUAL(info.stop, asked ? EITS_STOP_GAP : EITS_STOP_ITERATIONS);
-                double *x = dense_copy(eits_get_coefficients(ctx), N),
-                       *y = dense_copy(ctx->frame.y, RANK);
-                const double gap = dense_gap(&b.d, y, x, (double)info.lambda, (eits_sign)sign),
-                             scale = 0.5 * dense_dot(y, y, RANK);
-                CHECK_NEAR(gap, info.gap, 100 * EPS * scale);
-                CHECK(gap <= BOTH_WIDTHS(1e-5, 1e-11) * scale * (1 + 1e-3) + 100 * EPS * scale);
-                CHECK(info.nonzeros >= 3);
-                free(x), free(y);
-            }
-        }
+    static const struct {
+        const char *name;
+        eits_sign sign;
+        int asked;      /* for a gap; else there is time for as small a one */
+        uint32_t every; /* how often the gap is looked at, which is also when columns are added */
+        int prepared;
+    } rows[] = {
+        {"increase, a gap, each iteration", EITS_SIGN_INCREASE, 1, 1, 1},
+        {"increase, a gap, every 8th", EITS_SIGN_INCREASE, 1, 8, 0},
+        {"increase, a gap, every 50th", EITS_SIGN_INCREASE, 1, 50, 0},
+        {"decrease, a gap, every 15th", EITS_SIGN_DECREASE, 1, 15, 1},
+        {"decrease, time, every 8th", EITS_SIGN_DECREASE, 0, 8, 0},
+        {"both, a gap, every 22nd", EITS_SIGN_BOTH, 1, 22, 0},
+        {"both, time, each iteration", EITS_SIGN_BOTH, 0, 1, 1},
+        {"both, time, every 50th", EITS_SIGN_BOTH, 0, 50, 0},
+    };
+    EACH_ROW(row, rows) {
+        eits_context *ctx = set_up(&b, RANDOM, row->prepared);
+        eits_options o =
+            with(ctx, EITS_SOLVER_WORKING_SET, row->asked ? 50000 : 20000, row->sign, 0.03);
+        o.gap_every = row->every;
+        o.gap_rel = row->asked ? R(BOTH_WIDTHS(1e-5, 1e-11)) : 0;
+        const eits_info info = solve(ctx, o);
+        CHECK_EQUAL(info.stop, row->asked ? EITS_STOP_GAP : EITS_STOP_ITERATIONS);
+        double *x = dense_copy(eits_get_coefficients(ctx), N), *y = dense_copy(ctx->frame.y, RANK);
+        const double gap = dense_gap(&b.d, y, x, (double)info.lambda, row->sign),
+                     scale = 0.5 * dense_dot(y, y, RANK);
+        CHECK_NEAR(gap, info.gap, 100 * EPS * scale);
+        CHECK(gap <= BOTH_WIDTHS(1e-5, 1e-11) * scale * (1 + 1e-3) + 100 * EPS * scale);
+        CHECK(info.nonzeros >= 3);
+        free(x), free(y);
     }
 }
 

@@ -76,14 +76,14 @@ static void mirror_events(const host_packet *packet)
     const eits_packet_events *head = (const eits_packet_events *)(const void *)packet->payload;
     const eits_packet_event *sent = (const eits_packet_event *)(const void *)(head + 1);
     eits_event events[EITS_MAX_EVENTS];
-    uint32_t told = 0;
+    uint32_t count = 0;
     CHECK_OK(eits_gestures_update(&mirror.gestures, mirror.found, mirror.found_count, head->time_us,
-                                  events, EITS_MAX_EVENTS, &told));
+                                  events, EITS_MAX_EVENTS, &count));
     ++mirror.frames_of_events;
-    mirror.events += told;
-    mirror.different += head->frame != mirror.frame || head->count != told ||
-                        packet->size != sizeof *head + told * sizeof *sent;
-    for (uint32_t k = 0; k < told && k < head->count; ++k)
+    mirror.events += count;
+    mirror.different += head->frame != mirror.frame || head->count != count ||
+                        packet->size != sizeof *head + count * sizeof *sent;
+    for (uint32_t k = 0; k < count && k < head->count; ++k)
         mirror.different += sent[k].kind != events[k].kind || sent[k].phase != events[k].phase ||
                             sent[k].first_id != events[k].first_id ||
                             sent[k].second_id != events[k].second_id ||

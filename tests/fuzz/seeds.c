@@ -52,7 +52,7 @@ static void models(void)
         if (spec.shape == SMALL_WAVES && spec.side * spec.side < spec.rank)
             continue;
         small_model made = small_model_make(spec);
-        small_put_u32(small_model_section(&made, "DEFS", NULL), 1 + k);      /* iterations */
+        small_put_u32(small_model_section(&made, "DEFS", NULL), 1 + k); /* iterations */
         small_put_u32(small_model_section(&made, "DEFS", NULL) + 56,
                       k % 3 < 2 ? k % 3 : EITS_SOLVER_ACTIVE_SET);
         small_model_seal(&made);

@@ -1,8 +1,6 @@
 """What every Python test may use."""
 
-import re
 from collections.abc import Iterator
-from fnmatch import translate
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -20,7 +18,6 @@ from margins import (  # noqa: F401
 )
 
 NEEDED = ("matplotlib", "netgen", "scipy", "skfem", "sklearn", "unicorn")
-LONG = Path(__file__).with_name("long_tests.txt")
 hypothesis.settings.register_profile("fixed", derandomize=True)  # the short tier's
 
 
@@ -29,17 +26,6 @@ def pytest_sessionstart() -> None:
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         raise pytest.UsageError(f"no {', '.join(missing)} here: pip install -e '.[test]'")
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what ``long_tests.txt`` lists."""
-    lines = LONG.read_text(encoding="utf-8").splitlines()
-    patterns = [translate(line) for line in lines if line and not line.startswith("#")]
-    is_long = re.compile("|".join(patterns)).match
-    for item in items:
-        name = item.nodeid.rpartition("tests/python/")[2].replace("[", "(").replace("]", ")")
-        if is_long(name):
-            item.add_marker(pytest.mark.long)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,10 +1,9 @@
-/* eitskin: many frames that have nothing to do with each other, in one call.
+/* eitskin: many independent frames in one call.
  *
- * For hosts that solve recorded or simulated frames: one call from Python for thousands of frames
- * costs nothing in between, and threads share the work where each has a context of its own on the
- * same model. Each frame starts cold, so that its result does not depend on the others, nor on how
- * they are divided among threads. A stream, where touches are followed, calls eits_reconstruct and
- * eits_find_touches instead. */
+ * For hosts that solve recorded or simulated frames: Python makes one call for thousands of frames.
+ * Threads can share the work, each with its own context on the same model. Each frame starts cold,
+ * so that its result depends neither on the others nor on how they are divided among threads. A
+ * stream, in which touches are tracked, calls eits_reconstruct and eits_find_touches instead. */
 #ifndef EITSKIN_BATCH_H
 #define EITSKIN_BATCH_H
 
@@ -14,18 +13,18 @@
 extern "C" {
 #endif
 
-/* One frame's result. Ids count on through the batch, as a frame's touches follow none. */
+/* One frame's result. Every touch of a batch has an id of its own, since none is tracked. */
 typedef struct eits_result {
-    /* of eits_reconstruct; where it is not EITS_OK there are no touches and the image is zero */
+    /* of eits_reconstruct; if it is not EITS_OK, there are no touches and the image is zero */
     eits_status status;
-    uint32_t count; /* touches; 0 where they were not looked for */
+    uint32_t count; /* of touches; 0 if `touches` was NULL */
     eits_info info;
 } eits_result;
 
-/* eits_forget, eits_reconstruct and eits_find_touches for each of `count` frames of `length`
- * numbers. `images` and `coefficients` (count x n_pixels) may be NULL; `touches` (count x
- * EITS_MAX_TOUCHES) too: then they are not looked for. A frame that is refused says so in its
- * result; the others are done. Errors: EITS_E_ARGUMENT. */
+/* Call eits_forget, eits_reconstruct and eits_find_touches for each of `count` frames of `length`
+ * voltages. `images` and `coefficients` (count x n_pixels) may be NULL. `touches` (count x
+ * EITS_MAX_TOUCHES) may be NULL too; then no touches are looked for. A frame that is rejected has
+ * its status in its result, and the next ones are solved all the same. Errors: EITS_E_ARGUMENT. */
 eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, size_t length,
                                    size_t count, eits_real *images, eits_real *coefficients,
                                    eits_touch *touches, eits_result *results);

@@ -1,6 +1,6 @@
 /* eitskin: one reconstruction context in memory that the caller owns.
  *
- * All that is needed, errors apart (each call returns an eits_status):
+ * A whole program, without its error handling (each call returns an eits_status):
  *
  *     static _Alignas(16) uint8_t workspace[140 * 1024]; // or eits_workspace_size(&model, 0) bytes
  *     eits_model model;                                  // a view of the blob, which stays
@@ -19,136 +19,92 @@
  *         eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count);
  *     }
  *
- * `measure` stands for whatever gives n_rows voltages in the order of the model's protocol.
- * eits_find_touches may be left out. Contexts share nothing; one context is used by one thread at a
- * time.
+ * `measure` stands for the caller's function that returns n_rows voltages in the order of the
+ * model's protocol. Calling eits_find_touches is optional. Contexts share nothing. One thread at a
+ * time may use a context.
  */
 #ifndef EITSKIN_CONTEXT_H
 #define EITSKIN_CONTEXT_H
 
 #include "eitskin/options.h"
+#include "eitskin/sizes.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* The reference and its noise, as eits_get_reference gives them (frame.h takes it). */
+/* The reference and its noise, as eits_get_reference reports them. frame.h takes a reference. */
 typedef struct eits_reference_info {
-    /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them. In the
-     * context: as long as the context, until the next reference */
+    /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them. It
+     * lies in the context and changes with the next reference */
     const eits_real *v0;
     uint32_t count;   /* reference frames that are in v0 */
     uint32_t ready;   /* 1: frames can be measured against it; 0: there is none, or not yet */
     eits_real v0_rms; /* rms of v0 over the rows in use, V */
-    /* model volts per measured volt: rms(v_ref) / rms(v0), negative where correlation is */
+    /* model volts per measured volt: rms(v_ref) / rms(v0), with the sign of `correlation` */
     eits_real gain;
-    /* of v0 with v_ref on the folded rows: near 1 where skin, order and sign are right */
+    /* of v0 with v_ref on the folded rows: near 1 if skin, row order and sign are right */
     eits_real correlation;
     eits_real noise_v; /* rms over rows of the reference frames' deviation, V; 0 if unknown */
-    /* greatest max(S'y) seen in reference frames, as with all rows in use; 0 if unknown */
+    /* the greatest max(S'y) of a reference frame, for all rows in use; 0 if unknown */
     eits_real lambda_noise;
     uint32_t outliers; /* readings of reference frames that were left out */
 } eits_reference_info;
 
-/* One reconstruction: model, options, reference, image, touches. It lies in its workspace and is
- * reached by functions alone. */
+/* One reconstruction: model, options, reference, image, touches. It lies in its workspace; programs
+ * reach it through functions only. */
 typedef struct eits_context eits_context;
 
-/* ---- Sizes, all constant expressions where their arguments are ---- */
-
-/* Columns of a panel: S in panels has that many columns side by side, row after row, so that a
- * product S'v fills vector registers without gathering. */
-#define EITS_PANEL 32u
-#define EITS_PANEL_COLUMNS(n_pixels) \
-    (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
-
-/* Columns of S that are kept unpacked as floats: more than a working set or a disc has. */
-#define EITS_MAX_CACHED 256u
-#define EITS_CACHED(n_pixels) \
-    ((size_t)((n_pixels) < EITS_MAX_CACHED ? (n_pixels) : EITS_MAX_CACHED))
-
-/* Bytes of a line of the processor's cache: panels start at a multiple, where no vector of theirs
- * lies across two lines. */
-#define EITS_LINE 64u
-
-/* Each array starts at a multiple of 16 bytes. */
-#define EITS_ALIGN16(bytes) (((size_t)(bytes) + 15u) & ~(size_t)15u)
-#define EITS_REALS(count)   EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
-
-/* rank, rounded up to the eight lanes in which sums are made (base/vec.h). */
-#define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
-
-/* A list of pixels or of folded rows. */
-#define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
-
-/* Numbers of an upper triangle whose rows begin at multiples of eight columns. */
-#define EITS_PADDED_TRIANGLE(rank) (EITS_STRIDE(rank) * (EITS_STRIDE(rank) + 8u) / 2u)
-
-/* Bytes of the context itself, at the workspace's start; what is not arrays. Pointers and numbers
- * of whatever width; a little is left over. */
-#define EITS_CONTEXT_SIZE EITS_ALIGN16(732u + 63u * sizeof(void *) + 384u * sizeof(eits_real))
-
-/* Bytes of workspace; a constant expression. n_cells is nx * ny; `prepared` is 1 to keep panel-wise
- * copies of S and of the working set (hosts), else 0. */
-#define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)                   \
-    (EITS_CONTEXT_SIZE + 3 * EITS_REALS(n_rows) + 2 * EITS_ALIGN16(n_rows) +                       \
-     2 * EITS_ALIGN16(n_folded) + 4 * EITS_REALS(n_folded) +                                       \
-     (91 + EITS_STRIDE(rank) + 2 * (size_t)(rank) + EITS_MAX_TOUCHES) *                            \
-         EITS_REALS(EITS_STRIDE(rank)) +                                                           \
-     5 * EITS_REALS(n_pixels) + EITS_REALS(EITS_LIST(n_pixels, n_folded)) +                        \
-     EITS_ALIGN16(EITS_LIST(n_pixels, n_folded) * 4u) + EITS_ALIGN16((size_t)(n_pixels) * 4u) +    \
-     EITS_ALIGN16((size_t)(n_cells) * 2u) +                                                        \
-     EITS_ALIGN16(EITS_CACHED(n_pixels) * EITS_STRIDE(rank) * 4u) +                                \
-     EITS_ALIGN16((size_t)(n_pixels) * 2u) + EITS_ALIGN16(EITS_CACHED(n_pixels) * 2u) +            \
-     EITS_ALIGN16(EITS_CACHED(n_pixels)) + EITS_ALIGN16(EITS_CACHED(n_pixels) * 4u) +              \
-     ((prepared) ? 2 * EITS_REALS(EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank)) + EITS_LINE - 16u \
-                 : 0u))
-
-/* The same number for an open model, as a function. Returns 0 for a null model. */
+/* Bytes of workspace for an open model, as EITS_WORKSPACE_SIZE (sizes.h) counts them. `prepared` is
+ * 1 to keep S and the working set's columns in panels as well, which is faster on hosts, else 0.
+ * Returns 0 for a null model. */
 size_t eits_workspace_size(const eits_model *model, int prepared);
 
-/* Lay out a context in `workspace` (16-byte aligned, the caller's as long as the context is used;
- * so is `model`) and set the model's default options; *ctx then points into it. With room for it
- * (see `prepared` above) S is also copied into panels, which is faster where memory is plentiful
- * and gives the same bits. Errors: EITS_E_ARGUMENT, EITS_E_WORKSPACE (smaller than
- * eits_workspace_size(model, 0), or not aligned); *ctx is untouched then. EITS_E_ARITHMETIC: the
- * library was compiled in a way that changes bits; what the context then gives is near, not equal.
- */
+/* Lay out a context in `workspace` and set the model's default options; *ctx then points into it.
+ * `workspace` starts at a multiple of 16 bytes; it and `model` must stay as long as the context is
+ * used. If `size` is at least eits_workspace_size(model, 1), S is also copied into panels, which is
+ * faster and gives the same bits. Errors: EITS_E_ARGUMENT, EITS_E_WORKSPACE (smaller than
+ * eits_workspace_size(model, 0), or not aligned); *ctx is then unchanged. EITS_E_ARITHMETIC: the
+ * library was compiled in a way that changes bits; the context works, but its results are only
+ * close to those of other builds. */
 eits_status eits_init(void *workspace, size_t size, const eits_model *model, eits_context **ctx);
 
-/* Replace the options. Errors: EITS_E_ARGUMENT for one that is out of range or not finite; then
- * nothing is changed. */
+/* Replace the options. Errors: EITS_E_ARGUMENT if one is out of range or not finite; then none is
+ * changed. */
 eits_status eits_set_options(eits_context *ctx, const eits_options *options);
 
-/* Use the portable matrix products (1) or the fastest that this processor has (0, the default).
- * Same bits. */
+/* Use the portable matrix products (1), or the fastest that this processor has (0, the default).
+ * Both give the same bits. */
 eits_status eits_use_portable_kernels(eits_context *ctx, int portable);
 
-/* Forget the warm start and the touches that were followed. */
+/* Forget the warm start and the tracked touches. */
 void eits_forget(eits_context *ctx);
 
 /* ---- What a context knows ----
  *
- * Pointers into the context: valid as long as it is, not to be written to. What they point to
- * changes with the next frame. `ctx` must not be NULL here, unless an error is stated. */
+ * These functions return pointers into the context, valid as long as the context is. Do not write
+ * through them; their content changes with the next frame. `ctx` must not be NULL, unless an error
+ * is stated. */
 
 const eits_model *eits_get_model(const eits_context *ctx);
 const eits_options *eits_get_options(const eits_context *ctx);
 
-/* Of the last frame; each stage has filled in its fields. */
+/* Info of the last frame; each stage has filled in its own fields. */
 const eits_info *eits_get_info(const eits_context *ctx);
 
-/* The last image, n_pixels, S/m; and its coefficients, image over column weight. */
+/* The last image (n_pixels, S/m), and its coefficients: image over column weight. */
 const eits_real *eits_get_image(const eits_context *ctx);
 const eits_real *eits_get_coefficients(const eits_context *ctx);
 
-/* The last frame's reduced data y as the solver saw them, projected: EITS_STRIDE(rank) numbers. */
+/* The last frame's reduced data y as the solver used them, after projection: EITS_STRIDE(rank)
+ * numbers. */
 const eits_real *eits_get_reduced_data(const eits_context *ctx);
 
 /* Why each of the n_rows rows was left out of the last frame, bits of eits_row_state; 0: in use. */
 const uint8_t *eits_get_row_states(const eits_context *ctx);
 
-/* What the last frame showed of each electrode, bits of eits_electrode_state: n_electrodes. */
+/* The state of each of the n_electrodes electrodes in the last frame, bits of eits_electrode_state.
+ */
 const uint8_t *eits_get_electrode_states(const eits_context *ctx);
 
 /* 1 where row `row` is masked by eits_mask_row. Row numbers are not checked. */
@@ -157,12 +113,12 @@ int eits_is_masked(const eits_context *ctx, uint32_t row);
 /* Errors: EITS_E_ARGUMENT. */
 eits_status eits_get_reference(const eits_context *ctx, eits_reference_info *reference);
 
-/* "portable", "avx2"... of the kernels in use. */
+/* The name of the kernels in use: "portable", "avx2"... */
 const char *eits_kernels_name(const eits_context *ctx);
 
-/* ---- Put by, and taken up again ---- */
+/* ---- Save and restore ---- */
 
-/* Bytes of eits_save: what is learned from reference frames, masked rows, options and the next
+/* Bytes that eits_save writes: the reference and its noise, masked rows, options and the next
  * touch's id. */
 #define EITS_SAVED_SIZE(n_rows)                                                               \
     (EITS_ALIGN16(sizeof(eits_options) + 16u + 5u * sizeof(eits_real)) + EITS_REALS(n_rows) + \
@@ -171,14 +127,14 @@ const char *eits_kernels_name(const eits_context *ctx);
 /* The same number for an open model, as a function. Returns 0 for a null model. */
 size_t eits_saved_size(const eits_model *model);
 
-/* Copy that into `memory` (16-byte aligned): to go back to when a new reference comes to nothing,
- * or to go on with in a context that is laid out again for the same model. Reference frames that
- * have been added but not finished are not in it. Errors: EITS_E_ARGUMENT; EITS_E_WORKSPACE where
- * `size` is less than eits_saved_size or `memory` not aligned. */
+/* Save these into `memory` (16-byte aligned), to return to if a new reference fails, or to continue
+ * in a context that is laid out again for the same model. Reference frames that were added but not
+ * finished are not saved. Errors: EITS_E_ARGUMENT; EITS_E_WORKSPACE if `size` is less than
+ * eits_saved_size or `memory` is not aligned. */
 eits_status eits_save(const eits_context *ctx, void *memory, size_t size);
 
-/* Be as when it was saved; the warm start and followed touches are forgotten. `memory` must be
- * eits_save's, from a context of the same model. Errors: as eits_save. */
+/* Return to the saved state; the warm start and tracked touches are forgotten. `memory` must be
+ * from eits_save in the same program, for the same model. Errors: as eits_save. */
 eits_status eits_restore(eits_context *ctx, const void *memory, size_t size);
 
 #ifdef __cplusplus

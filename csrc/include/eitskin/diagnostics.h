@@ -1,10 +1,11 @@
-/* eitskin: what the core says of a frame: what is wrong with it, what it cost, how its solve ended.
+/* eitskin: what the core reports about a frame: faults, costs, and how its solve ended.
  *
- * The frame stage examines rows and electrodes before anything is solved, and leaves out what would
- * spoil the image; the solver and the touch fit examine the result. A diagnostic is no error: the
- * core images what is left of the frame. It rejects a frame, its diagnostics still named, only
- * where more rows are left out than options.max_masked. options.diagnostics chooses what is looked
- * for; saturated rows are left out in any case. docs/reference/diagnostics.md has each rule.
+ * The frame stage examines rows and electrodes before anything is solved, and leaves out those that
+ * would spoil the image; solver and touch fit examine the result. A diagnostic is not an error: the
+ * core makes an image of the rest of the frame. It rejects a frame only if more rows than
+ * options.max_masked are left out; the diagnostics are reported all the same. options.diagnostics
+ * chooses the diagnostics; saturated rows are left out in any case. docs/reference/diagnostics.md
+ * has the rule of each.
  *
  * Written by tables/make_tables.py from tables/diagnostics.toml.
  */
@@ -25,20 +26,20 @@ typedef enum eits_diagnostic {
     EITS_DIAGNOSTIC_ELECTRODE_OPEN = 2,
     /* leaves the rows of both electrodes out and names them */
     EITS_DIAGNOSTIC_BRIDGED = 4,
-    /* leaves single rows that nothing else bears out out, and counts them */
+    /* leaves out single rows that disagree with all others, and counts them */
     EITS_DIAGNOSTIC_OUTLIER = 8,
-    /* leaves the rows of an electrode out that too many outliers share, and names it */
+    /* names an electrode that too many outliers share, and leaves its rows out */
     EITS_DIAGNOSTIC_ELECTRODE_NOISY = 16,
-    /* images the frame, of which no change of the modelled skin gives so much of the data
-     * (model_mismatch) */
+    /* images the frame, although no change of the modelled skin explains the fraction
+     * model_mismatch of the data */
     EITS_DIAGNOSTIC_MODEL_MISMATCH = 32,
-    /* images the frame, which changes the way touches cannot */
+    /* images the frame, although it changes in a way that touches cannot */
     EITS_DIAGNOSTIC_STALE_REFERENCE = 64,
     /* eits_find_touches reports more touches than can be separated */
     EITS_DIAGNOSTIC_CROWDED = 128,
-    /* images the frame with the strongest regularisation, whose middle places a touch that is alone
-     * and unsure: its reference is further from the model's, or from its own reciprocals, than an
-     * uneven skin's is */
+    /* images the frame with the strongest regularisation; a single uncertain touch is placed at the
+     * middle of that image. The reference is further from the model's, or from its own reciprocals,
+     * than that of an uneven skin */
     EITS_DIAGNOSTIC_UNLIKE_MODEL = 256
 } eits_diagnostic;
 #define EITS_DIAGNOSTICS_ALL 511u
@@ -59,10 +60,10 @@ typedef enum eits_row_state {
     EITS_ROW_NOISY = 64
 } eits_row_state;
 
-/* An electrode's place in a row of the protocol takes a byte. */
+/* A row of the protocol names each electrode by one byte. */
 #define EITS_MAX_ELECTRODES 256u
 
-/* Bits of an electrode's state; 0 where nothing is wrong with it. */
+/* Bits of an electrode's state; 0 if nothing is wrong with it. */
 typedef enum eits_electrode_state {
     EITS_ELECTRODE_OPEN = 1,
     EITS_ELECTRODE_BRIDGED = 2,
@@ -71,25 +72,25 @@ typedef enum eits_electrode_state {
 
 /* Why the solver stopped. */
 typedef enum eits_stop {
-    /* the given number of iterations was done */
+    /* options.iterations were done */
     EITS_STOP_ITERATIONS = 0,
     /* the duality gap was small enough */
     EITS_STOP_GAP = 1,
     /* lambda_max lies below the detection threshold: no touch, the image is zero */
     EITS_STOP_BELOW_THRESHOLD = 2,
-    /* lambda >= lambda_max: zero is the exact optimum; or |y| < 2^-51 (4.4e-16; double: 1e-146),
-     * whose square says nothing */
+    /* lambda >= lambda_max: zero is the exact optimum; or |y| < 2^-51 (4.4e-16; in double 1e-146),
+     * too small to be squared */
     EITS_STOP_ZERO = 3,
     /* the objective rose, or all went to zero, although the step was halved again and again; the
      * image is zero */
     EITS_STOP_DIVERGED = 4,
-    /* the next step would have passed mac_limit: the image is the best until then */
+    /* the next step would have exceeded mac_limit: the image is the best one so far */
     EITS_STOP_MACS = 5,
     /* no coefficient moves any more except by rounding; of the active set alone */
     EITS_STOP_OPTIMUM = 6
 } eits_stop;
 
-/* What a reconstruction cost, how it ended and what was wrong with the frame. */
+/* The cost of a reconstruction, how it ended, and what was wrong with the frame. */
 typedef struct eits_info {
     /* of the solver */
     uint32_t iterations;
@@ -108,12 +109,12 @@ typedef struct eits_info {
     uint64_t touch_macs;
     /* as used */
     eits_real lambda;
-    /* the least lambda whose image is zero: max(S'y) along the sign */
+    /* the smallest lambda whose image is zero: max(S'y), by the option sign */
     eits_real lambda_max;
-    /* the reference's, times what rows left out add */
+    /* the reference's, times a factor for the rows that are left out */
     eits_real lambda_noise;
-    /* duality gap at the result, absolute; 0 where stop is BELOW_THRESHOLD, ZERO or DIVERGED, and
-     * where MACS came before anything was known */
+    /* duality gap at the result, absolute; 0 if stop is BELOW_THRESHOLD, ZERO or DIVERGED, or if it
+     * is MACS and not even one product with S was affordable */
     eits_real gap;
     /* gap / (|y|^2 / 2) */
     eits_real gap_rel;
@@ -127,11 +128,11 @@ typedef struct eits_info {
     uint32_t saturated;
     /* rows left out as outliers */
     uint32_t outliers;
-    /* fraction of |d| beyond noise that lies outside the model's range, 0 to 1; 0 where that was
-     * not examined */
+    /* fraction of |d| above noise that lies outside the model's range, 0 to 1; 0 if it was not
+     * examined */
     eits_real model_mismatch;
-    /* fraction of |y|^2 that the touches leave, set by eits_find_touches; 0 where none were looked
-     * for */
+    /* fraction of |y|^2 that the touches do not explain, set by eits_find_touches; 0 if no touches
+     * were looked for */
     eits_real unexplained;
     /* bit e: electrode e, of the first 64; eits_get_electrode_states has all */
     uint64_t open_electrodes;
@@ -139,13 +140,14 @@ typedef struct eits_info {
     uint64_t bridged_electrodes;
     /* bit e: electrode e */
     uint64_t noisy_electrodes;
-    /* of the whitening, over s_1^2, as this frame was reduced; 0 where the model does not say */
+    /* regularisation of the whitening of this frame, over s_1^2; 0 if the model does not state
+     * it */
     eits_real regularisation;
 } eits_info;
 
 /* One touch. */
 typedef struct eits_touch {
-    /* counts up from 1; stays with a touch from frame to frame */
+    /* counts up from 1; a touch keeps it from frame to frame */
     uint32_t id;
     /* the centre */
     eits_real x_mm;
@@ -153,21 +155,21 @@ typedef struct eits_touch {
     eits_real radius_mm;
     /* conductivity change integrated over the touch: S mm^2/m */
     eits_real strength_s_per_m_mm2;
-    /* fraction of |y|^2 that leaving this touch out would leave unexplained: 0 to 1; 0 where it was
-     * not found in this frame and is held */
+    /* fraction of |y|^2 that would be unexplained without this touch, 0 to 1; 0 if it was not found
+     * in this frame and is held */
     eits_real explained;
-    /* how hard it presses, N; 0 where the model is not calibrated (force.h) */
+    /* its force, N; 0 if the model is not calibrated (force.h) */
     eits_real force_n;
-    /* probability that there is a touch, and no second one of the same; 0 where that is not known:
-     * the model does not say what it may be wrong by, or the touch is held */
+    /* probability that this is a touch, and not a second one found for the same touch; 0 if it is
+     * not known: the model has no section UNCE, or the touch is held */
     eits_real confidence;
-    /* covariance of the centre as this frame shows it, mm^2; 0 where it is not known */
+    /* covariance of the centre in this frame, mm^2; 0 if it is not known */
     eits_real x_variance_mm2;
     eits_real xy_covariance_mm2;
     eits_real y_variance_mm2;
-    /* half of the long axis as a vector, mm, of the ellipse of area pi radius_mm^2 that the touch
-     * is found to be; the short one is radius_mm^2 over its length. 0, 0: a disc, or the data do
-     * not tell */
+    /* half of the long axis, as a vector, mm, of the ellipse that the touch is found to be. Its
+     * area is pi radius_mm^2, so half of the short axis is radius_mm^2 over this length. 0, 0: a
+     * disc, or the data do not show a shape */
     eits_real long_x_mm;
     eits_real long_y_mm;
 } eits_touch;

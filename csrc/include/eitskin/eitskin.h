@@ -7,6 +7,7 @@
  *
  *     model.h        a stored model, read in place, from flash or from memory
  *     context.h      options, results, and the workspace of one reconstruction
+ *     sizes.h        how large a workspace is, and which arrays are in it
  *     frame.h        the reference, and from a frame to the solver's data
  *     diagnostics.h  what is wrong with a frame, by name
  *     solve.h        from the data to an image

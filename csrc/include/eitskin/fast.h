@@ -51,24 +51,77 @@ typedef enum eits_fast_frame {
 /* The state, in memory that the caller owns. */
 typedef struct eits_fast eits_fast;
 
-/* What its size is made of: drives that wait, the state itself, and what is kept of a drive. */
+/* ---- What its size is made of ---- */
+
+/* Drives that may wait for an explanation. */
 #define EITS_FAST_WAITING 9u
-#define EITS_FAST_STATE   EITS_ALIGN16(700u + 40u * sizeof(void *) + 1840u * sizeof(eits_real))
-#define EITS_FAST_DRIVE   (16u + 3u * EITS_FAST_TOUCHES * sizeof(eits_real))
+
+/* Numbers of a touch's state: x, y, strength and two speeds; and of a row's answer to a touch: the
+ * answer, and its derivatives by x and y. */
+#define EITS_FAST_STATE_NUMBERS  5u
+#define EITS_FAST_ANSWER_NUMBERS 3u
+
+/* All touches' states; with their covariance. */
+#define EITS_FAST_STATES (EITS_FAST_TOUCHES * EITS_FAST_STATE_NUMBERS)
+
+/* What one drive contributes to one fit, 22 numbers: each waiting drive has two, and each of three
+ * fits has one per waiting drive and 30 numbers of its own. */
+#define EITS_FAST_FIT_NUMBERS ((2u + 3u) * EITS_FAST_WAITING * 22u + 3u * 30u)
+
+/* Bytes of the state without its arrays: states, covariance and fits; 28 numbers and 5 per touch
+ * beside these; counts and flags; pointers. csrc/src/fast/fast.h asserts that it fits. */
+#define EITS_FAST_STATE                                                                      \
+    EITS_ALIGN16((EITS_FAST_STATES * (EITS_FAST_STATES + 1u) + EITS_FAST_FIT_NUMBERS + 28u + \
+                  5u * EITS_FAST_TOUCHES) *                                                  \
+                     sizeof(eits_real) +                                                     \
+                 EITS_MAX_ELECTRODES + 112u * sizeof(uint32_t) + 40u * sizeof(void *))
+
+/* Bytes of what is kept of a drive: where its rows are and which touches were there, and their
+ * places and strengths. */
+#define EITS_FAST_DRIVE (16u + EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS * sizeof(eits_real))
+
+/* Every second pixel along x and y is a cell of the map; and the numbers of a packed triangle. */
 #define EITS_FAST_CELLS(nx, ny)        (((size_t)(nx) + 1u) / 2u * (((size_t)(ny) + 1u) / 2u))
 #define EITS_FAST_TRIANGLE(drive_rows) ((size_t)(drive_rows) * ((size_t)(drive_rows) + 1u) / 2u)
 
+/* Every array but the drives and what each waiting drive keeps: ARRAY(place, element, count), in
+ * the order in which they lie in memory, as EITS_WORKSPACE_ARRAYS (sizes.h). `place` is the member
+ * of eits_fast that points to it. */
+/* clang-format off */
+#define EITS_FAST_ARRAYS(ARRAY, n_rows, drive_rows, nx, ny)                                        \
+    /* which row is where, and which pixels are cells */                                           \
+    ARRAY(row, uint16_t, n_rows)                                                                   \
+    ARRAY(cell, uint16_t, EITS_FAST_CELLS(nx, ny))                                                 \
+    ARRAY(masked, uint8_t, n_rows)                                                                 \
+    ARRAY(used, uint8_t, drive_rows)                                                               \
+    ARRAY(gain, eits_real, n_rows)                                                                 \
+    /* the rows of the present drive */                                                            \
+    ARRAY(z, eits_real, drive_rows)                                                                \
+    ARRAY(along, eits_real, drive_rows)                                                            \
+    ARRAY(e, eits_real, drive_rows)                                                                \
+    ARRAY(white, eits_real, drive_rows)                                                            \
+    ARRAY(spare, eits_real, drive_rows)                                                            \
+    /* their answers to each touch; their covariance with the states; the factor of their own */   \
+    ARRAY(answer, eits_real, EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS * (size_t)(drive_rows))  \
+    ARRAY(moved, eits_real, EITS_FAST_STATES * (size_t)(drive_rows))                               \
+    ARRAY(factor, eits_real, EITS_FAST_TRIANGLE(drive_rows))                                       \
+    /* the maps of what a new touch in a cell would explain: the first, and a second beside it */  \
+    ARRAY(score, eits_real, EITS_FAST_CELLS(nx, ny))                                               \
+    ARRAY(pair_score, eits_real, EITS_FAST_CELLS(nx, ny))
+
+/* What each of the EITS_FAST_WAITING drives keeps: its whitened rows, and the factor of then. */
+#define EITS_FAST_WAITING_ARRAYS(ARRAY, drive_rows)                                                \
+    ARRAY(white, eits_real, drive_rows)                                                            \
+    ARRAY(factor, eits_real, EITS_FAST_TRIANGLE(drive_rows))
+/* clang-format on */
+
 /* Bytes of its memory, a constant expression: of a model with `n_rows` rows in `drives` drives, the
  * longest of `drive_rows`, and a grid of nx x ny pixels. 20 kB for 16 electrodes in float32. */
-#define EITS_FAST_SIZE(n_rows, drives, drive_rows, nx, ny)                              \
-    (EITS_FAST_STATE + EITS_ALIGN16((size_t)(drives) * EITS_FAST_DRIVE) +               \
-     EITS_ALIGN16((size_t)(n_rows) * 2u) + EITS_ALIGN16(EITS_FAST_CELLS(nx, ny) * 2u) + \
-     EITS_ALIGN16(n_rows) + EITS_ALIGN16(drive_rows) + EITS_REALS(n_rows) +             \
-     (EITS_FAST_WAITING + 5u) * EITS_REALS(drive_rows) +                                \
-     EITS_REALS(3u * EITS_FAST_TOUCHES * (size_t)(drive_rows)) +                        \
-     EITS_REALS(5u * EITS_FAST_TOUCHES * (size_t)(drive_rows)) +                        \
-     (EITS_FAST_WAITING + 1u) * EITS_REALS(EITS_FAST_TRIANGLE(drive_rows)) +            \
-     2u * EITS_REALS(EITS_FAST_CELLS(nx, ny)))
+#define EITS_FAST_SIZE(n_rows, drives, drive_rows, nx, ny)              \
+    (EITS_FAST_STATE +                                                  \
+     EITS_ALIGN16((size_t)(drives) * EITS_FAST_DRIVE)                   \
+         EITS_FAST_ARRAYS(EITS_ADD_BYTES, n_rows, drive_rows, nx, ny) + \
+     EITS_FAST_WAITING * (0u EITS_FAST_WAITING_ARRAYS(EITS_ADD_BYTES, drive_rows)))
 
 /* The same number for an open model; 0 where it has no fields (section FLDS), or a drive more than
  * EITS_FAST_ROWS rows. */

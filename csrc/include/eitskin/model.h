@@ -1,18 +1,19 @@
 /* eitskin: a view of an .eitm model, read in place (docs/reference/eitm-format.md specifies the
  * bytes).
  *
- * A model is everything that is known of a skin before the first frame: its protocol, the reduced
- * sensitivity S of its pixels, the matrix P that brings data into the same space, the pixels'
- * places, the fields for what touches do to each other, defaults, and one golden frame to test the
- * core with. It is made offline from a description of the skin (`eitskin model build`).
+ * A model holds everything that is known about a skin before the first frame: its protocol, the
+ * reduced sensitivity S of its pixels, the matrix P that brings data into the same space, the
+ * pixels' places, the fields from which the interaction of touches is computed, default options,
+ * and one golden frame to test the core with. `eitskin model build` makes it from a description of
+ * the skin.
  *
- * Nothing is copied: the view points into the blob, which must stay where it is, unchanged, as long
- * as the view is used. Many contexts and threads may share one model. eits_model_open checks the
- * CRC, every length, index and number once, so that nothing has to be checked later; it reads the
- * whole blob, 0.3 MB as shipped. Sections that this version does not know are skipped.
+ * Nothing is copied: the view points into the blob, which must stay in place, unchanged, as long as
+ * the view is used. Many contexts and threads may share one model. eits_model_open checks the CRC
+ * and every length, index and number once, so that nothing has to be checked later. It reads the
+ * whole blob, 0.3 MB for the shipped skin. Sections that this version does not know are skipped.
  *
- * Names as in the format's page: m rows of the protocol, of which n_folded folds are left once
- * reciprocal rows are averaged; rank r; n pixels. P is r x n_folded, S is r x n.
+ * Dimensions, as in the format's page: the protocol has n_rows rows; averaging reciprocal rows
+ * leaves n_folded folded rows. P is rank x n_folded, S is rank x n_pixels.
  */
 #ifndef EITSKIN_MODEL_H
 #define EITSKIN_MODEL_H
@@ -23,7 +24,8 @@
 extern "C" {
 #endif
 
-/* A file of another major version is rejected; of a later minor one, what is new is skipped. */
+/* A file of another major version is rejected. In a file of a later minor version, new sections are
+ * skipped. */
 #define EITS_MODEL_MAJOR          1
 #define EITS_MODEL_MINOR          10
 #define EITS_MODEL_ALIGNMENT      16
@@ -46,8 +48,9 @@ typedef enum eits_storage {
 /* What the solver's data are, from a frame v and the reference frame v0. */
 typedef enum eits_data_kind {
     EITS_DATA_DIFFERENCE = 0, /* v - v0, in volts of the model */
-    EITS_DATA_NORMALISED = 1, /* (v - v0) / v0: for channels that have gains of their own */
-    /* v0 log(v / v0): the same sensitivity as a difference, straighter for strong touches */
+    EITS_DATA_NORMALISED = 1, /* (v - v0) / v0: for rows that have gains of their own */
+    /* v0 log(v / v0): the same sensitivity as a difference, more nearly linear for strong touches
+     */
     EITS_DATA_LOG_RATIO = 2
 } eits_data_kind;
 
@@ -63,20 +66,20 @@ typedef struct eits_matrix {
     eits_storage storage;
 } eits_matrix;
 
-/* The fields that the electrodes' currents make in the untouched skin, and the rim's mirror: for
- * what touches do to each other. */
+/* The fields that the electrodes' currents make in the untouched skin, and how the rim mirrors a
+ * dipole. The interaction of touches is computed from them. */
 typedef struct eits_fields {
-    /* f16, a column a pixel: E_x of each electrode's current, E_y of each, then a_x, a_y, b_x,
-     * b_y of the mirror (docs/reference/eitm-format.md, "FLDS"); data NULL where the model has
-     * none */
+    /* f16, one column per pixel: E_x of each electrode's current, E_y of each, then a_x, a_y, b_x,
+     * b_y of the mirror (docs/reference/eitm-format.md, "FLDS"); data is NULL if the model has none
+     */
     eits_matrix at;
     float volts;     /* dV = -volts change area E . E, in V per (S/m mm^2) */
     float per_sheet; /* 1 / (2 pi sigma): m/S */
 } eits_fields;
 
-/* One folded row: the mean of row `first` and, with `sign`, of its reciprocal `second`. What drives
- * and what measures may be exchanged (reciprocity), so the mean halves the noise's power; their
- * difference is an error of the instrument, a diagnostic. */
+/* One folded row: the mean of row `first` and, with `sign`, of its reciprocal `second`. By
+ * reciprocity the driving and the measuring pair may be exchanged, so the mean halves the noise's
+ * power. The difference of the two is an error of the instrument, and serves as a diagnostic. */
 typedef struct eits_fold {
     uint16_t first;
     uint16_t second; /* EITS_FOLD_NONE where the table has no reciprocal */
@@ -109,39 +112,39 @@ typedef struct eits_defaults {
     float follow_mm;
     float touch_radius_weight;
     uint32_t solver; /* eits_solver; files of format 1.0 have 0 here */
-    /* bits of eits_touch_fit (options.h) that are not set by default, EITS_GAIN_DRIFT_KEPT and
-     * EITS_REFERENCE_FOLLOWS;
-     * files before 1.2 have 0 here */
+    /* the bits of eits_touch_fit (options.h) that are not set by default; EITS_GAIN_DRIFT_KEPT;
+     * EITS_TRACKS_REFERENCE. Files before 1.2 have 0 here */
     uint32_t touch_fit_left_out;
 } eits_defaults;
-/* By default changes along the reference frame are data like others: a taught model has learned
- * what drifts. From format 1.5. */
-#define EITS_GAIN_DRIFT_KEPT   8u
+/* By default changes along the reference frame count as data (options.project_reference is 0): a
+ * taught model has learned what drifts. From format 1.5. */
+#define EITS_GAIN_DRIFT_KEPT  8u
 /* By default the reference follows the untouched skin (options.reference_frames). From 1.5. */
-#define EITS_REFERENCE_FOLLOWS 16u
+#define EITS_TRACKS_REFERENCE 16u
 
-/* The self-test inside a model: frames, and what a float32 solve with the defaults must give. A
- * board runs it before it believes an uploaded model. */
+/* The self-test inside a model: frames, and the results that a float32 solve with the defaults must
+ * give. A board runs it before it uses an uploaded model. */
 typedef struct eits_golden {
     const float *reference; /* n_rows, V */
     const float *frame;     /* n_rows, V */
-    const float *image;     /* n_pixels, S/m, bits as the float32 core gives them */
-    /* EITS_SELF_TEST_SUMS checksums of a set of frames (section SUMS); NULL: none of this core's */
+    const float *image;     /* n_pixels, S/m: the float32 core's result, bit for bit */
+    /* EITS_SELF_TEST_SUMS checksums of a set of frames (section SUMS); NULL: none, or those of
+     * another EITS_SELF_TEST_REVISION */
     const uint32_t *sums;
 } eits_golden;
 
-/* Greatest table and polynomial of a calibration; a file with more is EITS_E_MODEL_VALUE. */
+/* The largest table and polynomial of a calibration. A file with more gives EITS_E_MODEL_VALUE. */
 #define EITS_MAX_FORCE_POINTS 64
 #define EITS_MAX_FORCE_ORDER  4
 
-/* How strength and place of a touch tell its force: what a calibration with known weights found
- * (force.h). */
+/* How the force follows from a touch's strength and place, found by a calibration with known
+ * weights (force.h). */
 typedef struct eits_force_head {
     uint32_t points;   /* of the table, 2 to EITS_MAX_FORCE_POINTS */
     uint32_t order;    /* of the gain's polynomial, at most EITS_MAX_FORCE_ORDER */
     float radius_mm;   /* u = x / radius_mm, v = y / radius_mm */
-    float reach;       /* sqrt(u^2 + v^2) of the outermost place that was calibrated */
-    float uncertainty; /* of a force, relative: 95 % of those left out of the fit were within it */
+    float reach;       /* sqrt(u^2 + v^2) of the outermost place in the calibration */
+    float uncertainty; /* relative error of a force: 95 % of held-out presses were within it */
     uint32_t reserved[3];
 } eits_force_head;
 
@@ -154,10 +157,10 @@ typedef struct eits_force {
     const float *gain;
 } eits_force;
 
-/* How P and S were whitened, as the model says (section WHIT): P = diag(w) U', S = diag(s w) V',
- * w_i = (s_i^2 + mu s_1^2)^-1/2. By row of P, `rank` numbers each. */
+/* How P and S were whitened, from section WHIT: P = diag(w) U', S = diag(s w) V', w_i = (s_i^2 + mu
+ * s_1^2)^-1/2. Each array has `rank` numbers, one per row of P. */
 typedef struct eits_row_form {
-    const float *scale;    /* 1 / (w_i s_1); NULL: the model does not say how it was whitened */
+    const float *scale;    /* 1 / (w_i s_1); NULL: the model does not state how it was whitened */
     const float *strength; /* (s_i / s_1)^2 */
     const float *energy;   /* |P_i|^2 = w_i^2 */
     const float *square;   /* s_i^2 */
@@ -166,28 +169,30 @@ typedef struct eits_row_form {
     float s1_square; /* |S_1|^2 */
 } eits_row_form;
 
-/* What the model itself may be wrong by (section UNCE), in reduced data: second moments found
- * offline from skins that differ from the modelled one as real skins do
+/* The errors of the model itself, in reduced data (section UNCE): second moments, computed offline
+ * from simulated skins that differ from the modelled one as real skins do
  * (docs/reference/eitm-format.md). Each is the lower triangle of a symmetric rank x rank matrix,
  * row after row. */
 typedef struct eits_uncertainty {
-    /* P E P', E that of (d_true - d_model) / |d_model| over touched skins, d the folded data;
-     * NULL: the model does not say what it may be wrong by, and touches are not tested */
+    /* P E P', where E is the second moment of (d_true - d_model) / |d_model| over touched skins,
+     * and d the folded data. NULL: the errors are not known, and touches are not tested */
     const float *errors;
-    const float *drift; /* P D P', D that of the data of a sheet that drifts untouched; V^2 */
-    uint32_t row_gains; /* 1: errors are of data multiplied by row gains from the reference */
-    float errors_rms;   /* |d_true - d_model| / |d_model|, rms: skins that differ */
-    float shapes_rms;   /* the same: touches that are no discs */
-    /* N, n_folded x place_rows, fold by fold, mm: |N'y|^2 is what the variance of a place grows by
-     * on a skin whose reference differs from the model by y = log(v0 / v_ref) (section GEOM); NULL:
+    const float *drift; /* P D P', where D is that of a sheet that drifts untouched; V^2 */
+    uint32_t
+        row_gains; /* 1: the errors are those of data multiplied by row gains from the reference */
+    float errors_rms; /* rms of |d_true - d_model| / |d_model| over skins that differ */
+    float shapes_rms; /* the same over touches that are not discs */
+    /* N, n_folded x place_rows, fold by fold, mm (section GEOM). On a skin whose reference differs
+     * from the model's by y = log(v0 / v_ref), the variance of a place is larger by |N'y|^2. NULL:
      * not known */
     const float *places;
     uint32_t place_rows; /* at most EITS_MAX_PLACE_ROWS */
-    /* M, n_folded x move_rows, fold by fold, mm, and U, 2 x move_terms x move_rows, first along x,
-     * then y: such a skin has a touch found off by the polynomial with coefficients U M'y, terms 1,
-     * x, y, x^2, x y, y^2 ... with x and y from the grid's middle over half its longer side
-     * (section MOVE); NULL: not known. And of y what no such skin has, n_folded x rest_rows: what
-     * is there all the same is of rows with gains of their own */
+    /* `moved` is M, n_folded x move_rows, fold by fold, mm; `moves` is U, 2 x move_terms x
+     * move_rows, first along x, then along y (section MOVE). On such a skin a touch is found
+     * displaced by the polynomial with the coefficients U M'y and the terms 1, x, y, x^2, x y, y^2
+     * ..., where x and y are measured from the grid's middle, over half its longer side. NULL: not
+     * known. `rest`, n_folded x rest_rows, spans the part of y that no such skin has; a y with that
+     * part comes from rows that have gains of their own */
     const float *moved, *moves, *rest;
     uint32_t move_rows, rest_rows; /* at most EITS_MAX_PLACE_ROWS */
     uint32_t move_terms;           /* 1, 3, 6, 10 or EITS_MAX_MOVE_TERMS; 0: none */
@@ -195,24 +200,25 @@ typedef struct eits_uncertainty {
 
 /* An open model. All pointers go into the blob; a caller reads it and never writes it. */
 typedef struct eits_model {
-    uint32_t n_electrodes; /* electrodes that the protocol's table counts from 0 */
-    uint32_t n_rows;       /* rows of the protocol table: voltages in a frame */
-    uint32_t n_folded;     /* after the reciprocity fold */
-    uint32_t rank;         /* rows of the reduced Jacobian */
-    uint32_t n_pixels;     /* kept pixels: length of images and coefficients */
-    /* columns and rows of the grid that they lie in; cells off the skin are not kept */
-    uint32_t nx, ny;
+    uint32_t n_electrodes; /* the protocol's table counts them from 0 */
+    uint32_t n_rows;       /* rows of the protocol's table: the voltages of a frame */
+    uint32_t n_folded;     /* rows that are left when reciprocal rows are averaged */
+    uint32_t rank;         /* rows of P and S: numbers of a frame's reduced data */
+    uint32_t n_pixels;     /* pixels on the skin: the length of images and coefficients */
+    uint32_t nx, ny;       /* columns and rows of the grid in which the pixels lie */
     eits_data_kind data_kind;
     float pixel_mm;                 /* width and height of a pixel */
     float origin_x_mm, origin_y_mm; /* lower left corner of pixel (0, 0) */
     float current_a;                /* drive current that v_ref was modelled with, A */
-    float lipschitz; /* at least the greatest eigenvalue of S'S as stored, and 2^-126 */
-    /* max over pixels of the deviation of (S'P n)_j for unit white noise n on the folded rows */
+    float lipschitz; /* at least the greatest eigenvalue of S'S as stored, and at least 2^-126 */
+    /* the maximum over pixels j of the standard deviation of (S'P n)_j, where n is white noise of
+     * variance 1 on the folded rows */
     float noise_gain;
     uint64_t protocol_hash;
     const uint8_t *protocol; /* n_rows x 4: I+, I-, V+, V- */
-    /* n_rows each: the rows in the order that they are measured, and when each one is, from 0
-     * (section ORDR); NULL: as they stand */
+    /* n_rows each (section ORDR): scan_order lists the rows in the order in which they are
+     * measured; scan_place is each row's place in that order, from 0. NULL: the order of the table
+     */
     const uint16_t *scan_order, *scan_place;
     const eits_fold *fold; /* n_folded */
     /* n_folded: boundary voltage of the untouched skin as modelled, V */
@@ -227,25 +233,26 @@ typedef struct eits_model {
     eits_force force;
     eits_row_form row_form;
     eits_uncertainty uncertainty;
-    /* n_folded (n_folded + 1) / 2, the lower triangle of R by rows: the inverse of the covariance
-     * of the rows' noise that P whitens, P R^-1 P' = I (section PREC of taught models); NULL: none
-     */
+    /* n_folded (n_folded + 1) / 2: the lower triangle, by rows, of the inverse R of the covariance
+     * of the rows' noise; P whitens that noise, P R^-1 P' = I (section PREC of taught models).
+     * NULL: not known */
     const float *precision;
-    /* what the covariance of a place by the fit's normal equations is multiplied by (section PLAC
-     * of taught models); 0: places are not rated so */
+    /* a place's covariance is the fit's, from its normal equations, times this factor (section PLAC
+     * of taught models); 0: the model does not rate places in this way */
     float place_factor;
     const char *meta; /* JSON, not terminated by 0; NULL if absent */
     uint32_t meta_size;
 } eits_model;
 
-/* Check `blob` wholly and fill `model` with pointers into it. `blob` must start at a multiple of 16
- * bytes (EITS_MODEL_ALIGNMENT); `size` may be larger than the model, as a flash bank is.
- * Errors: EITS_E_ARGUMENT, EITS_E_MODEL_*; `model` is untouched then. */
+/* Check all of `blob` and fill `model` with pointers into it. `blob` must start at a multiple of
+ * EITS_MODEL_ALIGNMENT bytes. `size` may be larger than the model, as a flash bank is. Errors:
+ * EITS_E_ARGUMENT, EITS_E_MODEL_*; `model` is then unchanged. EITS_E_MODEL_VALUE also if the model
+ * names a solver that this library does not have (options.h). */
 eits_status eits_model_open(eits_model *model, const void *blob, size_t size);
 
-/* What names a protocol: the firmware compares it with that of the table it scans, so that a model
- * is never fed with another order of rows. FNV-1a, 64 bits, over n_electrodes and n_rows as
- * little-endian u16 and the table's bytes. */
+/* The hash that identifies a protocol. The firmware compares the model's with that of the table
+ * which it scans, so that a model never gets rows in another order. FNV-1a, 64 bits, over
+ * n_electrodes and n_rows as little-endian u16 and the table's bytes. */
 uint64_t eits_protocol_hash(uint32_t n_electrodes, uint32_t n_rows, const uint8_t *table);
 
 /* CRC-32 (reflected 0xEDB88320, as in zlib) of `size` bytes, continuing from `crc` (0 to start). */

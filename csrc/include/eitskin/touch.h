@@ -3,13 +3,14 @@
  * The image's pixels are 6 mm wide on the shipped model; a touch is placed to a fraction of that. A
  * touch is a disc whose conductivity changed evenly, with a soft edge one pixel wide. Each peak of
  * the image starts one; places, radii and strengths are then fitted to the reduced data by damped
- * Gauss-Newton steps, one disc after another, for options.touch_sweeps rounds. Three parts refine
- * that, chosen by options.touch_fit (context.h): first places come from log data, which strong
- * touches bend less; discs are merged and split where that explains the data better; and what
- * touches do to each other's field is taken out of the data.
+ * Gauss-Newton steps, one disc after another, for options.touch_sweeps rounds. options.touch_fit
+ * (options.h) chooses three refinements: the first places come from log data, in which strong
+ * touches are more nearly linear; discs are merged or split if that explains the data better; and
+ * the interaction of touches (each changes the field at the others) is taken out of the data.
  *
- * A disc that explains too little of the data beside the others is dropped. Touches are followed
- * from frame to frame, for ids and, where options.track_smooth asks for it, for steadier places.
+ * A disc that explains too little of the data beside the others is dropped. Touches are tracked
+ * from frame to frame, so that each keeps its id and, with options.track_smooth, has a steadier
+ * place.
  */
 #ifndef EITSKIN_TOUCH_H
 #define EITSKIN_TOUCH_H
@@ -21,12 +22,11 @@ extern "C" {
 #endif
 
 /* The touches of the last reconstructed frame, strongest first, into `touches` (room for `room`;
- * may be NULL). Peaks of the image start discs, which are then fitted off the grid to the reduced
- * data, within a pixel of the image; one whose numbers would not be finite is left out. `count`
- * gets their number (also in info), which may exceed `room`. Ids follow touches from call to call,
- * so call it once a frame. Costs info.touch_macs, and sets info.touches, info.unexplained and the
- * diagnostic CROWDED; with options.second_pass also image and info as solved again.
- * Errors: EITS_E_ARGUMENT. */
+ * may be NULL). Lengths are in mm, strengths in S mm^2/m. A touch whose numbers would not be finite
+ * is left out. `count` gets their number, which may exceed `room`. Call it exactly once per frame,
+ * since ids are carried from call to call. Sets info.touches, info.touch_macs, info.unexplained and
+ * the diagnostic CROWDED; with options.second_pass it solves the frame again, and image and info
+ * are then those of the second solve. Errors: EITS_E_ARGUMENT. */
 eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t room,
                               uint32_t *count);
 

@@ -1,12 +1,10 @@
 /* eitskin: scalar width, status codes, version.
  *
- * eits_real is the scalar of every frame, image and touch. A program is built for one width: link
- * the library of that width, and define EITS_DOUBLE for the wide one (CMake and pkg-config do).
- * eits_real_size tells a binding which one it got.
- *
- * The same sources build twice on a host: with `float` (what a microcontroller runs) and, with
- * EITS_DOUBLE defined, with `double`, so that the narrow width is always judged against the wide
- * one of the same code.
+ * eits_real is the scalar of every frame, image and touch: `float`, which microcontrollers use, or
+ * `double` with EITS_DOUBLE defined. The same sources build in both widths, so that tests can
+ * compare the narrow one with the wide one. A program is built for one width: link the library of
+ * that width, and define EITS_DOUBLE for the wide one, as CMake and pkg-config do. A mismatch of
+ * program and library shows only in eits_real_size, so bindings compare it when they start.
  */
 #ifndef EITSKIN_TYPES_H
 #define EITSKIN_TYPES_H
@@ -22,20 +20,19 @@ extern "C" {
 #error "eitskin reads little-endian models in place; this target is big-endian"
 #endif
 
-/* Of the library that is linked; a mismatch shows in eits_real_size alone, so compare at start. */
 #ifdef EITS_DOUBLE
 typedef double eits_real;
 #else
 typedef float eits_real;
 #endif
 
-/* Library version, apart from the version of the .eitm format (model.h). */
+/* Version of the library; the .eitm format has its own (model.h). */
 #define EITS_VERSION_MAJOR 0
 #define EITS_VERSION_MINOR 1
 #define EITS_VERSION_PATCH 0
 
-/* Every function that can fail returns one of these. How a solve ended is not an error: see
- * eits_info.stop. */
+/* Every function that can fail returns one of these. A solve that ends early is not an error:
+ * eits_info.stop states how it ended. */
 typedef enum eits_status {
     EITS_OK = 0,
     EITS_E_ARGUMENT = -1,        /* a null pointer, or an option out of its documented range */
@@ -50,23 +47,22 @@ typedef enum eits_status {
     EITS_E_MODEL_VALUE = -8,
     EITS_E_MODEL_ALIGNMENT = -9, /* the blob does not start at a 16-byte boundary */
     EITS_E_FRAME_LENGTH = -10,   /* a frame's length is not the number of protocol rows */
-    EITS_E_FRAME_CHANNELS = -11, /* more channels are unusable than the options allow */
-    /* the reference or another frame is all zero, or a frame nothing but noise: the front end is
-     * dead */
+    EITS_E_FRAME_CHANNELS = -11, /* more rows cannot be used than options.max_masked allows */
+    /* the reference or another frame is all zero, or contains only noise: the front end is dead */
     EITS_E_FRAME_ZERO = -12,
     EITS_E_NO_REFERENCE = -13, /* a frame came before the reference frame was set */
     /* a reference was finished with fewer frames than it needs */
     EITS_E_REFERENCE_SHORT = -14,
     /* a result would not be finite; the outputs were cleared instead */
     EITS_E_NOT_FINITE = -15,
-    /* the core was compiled so that its results would have other bits than a model's golden frame:
-     * with contraction (compile with -ffp-contract=off), with sums in another order, or where the
-     * processor does not round to nearest */
+    /* the core was compiled so that its results differ in bits from a model's golden frame: with
+     * contraction (compile with -ffp-contract=off), with sums in another order, or for a processor
+     * that does not round to nearest */
     EITS_E_ARITHMETIC = -16
 } eits_status;
 
-/* One line of English for a status; never NULL. For people: programs compare the number, which no
- * later version changes. */
+/* One line of English for a status; never NULL. It is meant for people. Programs compare the
+ * number, which no later version changes. */
 const char *eits_status_text(eits_status status);
 
 /* "MAJOR.MINOR.PATCH" of the library that is linked. */

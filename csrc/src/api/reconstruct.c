@@ -33,10 +33,10 @@ eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t l
     eits_status status = eits_frame_stage(ctx, frame, length, &ctx->info.masked, &ctx->info.macs);
     if (status == EITS_OK) {
         status = eits_solve_frame(ctx, &ctx->scratch, ctx->options.warm_start != 0);
-        eits_follow_add(ctx, frame);
+        eits_reference_tracking_add(ctx, frame);
     } else {
         eits_answer_zero(ctx, EITS_STOP_BELOW_THRESHOLD);
-        eits_follow_break(ctx);
+        eits_reference_tracking_break(ctx);
     }
     if (image != NULL)
         eits_copy(image, ctx->solver.image, ctx->model->n_pixels);

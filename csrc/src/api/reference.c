@@ -58,7 +58,7 @@ eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t
         b->noise_v = 0;
         b->lambda_noise = 0;
         b->outliers = b->second_waits = 0;
-        b->follow = (eits_follow){0};
+        b->tracking = (eits_reference_tracking){0};
     }
     eits_zero(b->m2, length);
     return status;
@@ -78,7 +78,7 @@ eits_status eits_reference_begin(eits_context *ctx, uint32_t count)
     b->lambda_noise = 0;
     b->noise_v = 0;
     b->outliers = b->second_waits = 0;
-    b->follow = (eits_follow){0};
+    b->tracking = (eits_reference_tracking){0};
     return EITS_OK;
 }
 

@@ -59,7 +59,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     const uint32_t next_id = ctx->tracker.next_id;
     const uint32_t reported = eits_track(ctx, found, finite);
     if (ctx->tracker.next_id != next_id) /* as many as before may be others */
-        eits_follow_break(ctx);
+        eits_reference_tracking_break(ctx);
     ctx->info.touches = reported;
     for (uint32_t k = 0; k < reported; ++k) {
         eits_bring_onto_skin(ctx, &found[k].x_mm, &found[k].y_mm);
@@ -75,10 +75,10 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     if (count != NULL)
         *count = reported;
     const uint32_t followed = (ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0
-                                  ? EITS_FOLLOW_UNKNOWN
+                                  ? EITS_TOUCHES_UNKNOWN
                                   : ctx->tracker.count;
     /* Coefficients of another reference are no start. */
-    if (eits_follow_end(ctx, scratch, found, reported, followed, &ctx->info.touch_macs))
+    if (eits_reference_tracking_end(ctx, scratch, found, reported, followed, &ctx->info.touch_macs))
         ctx->solver.warm = 0;
     return EITS_OK;
 }

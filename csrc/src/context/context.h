@@ -14,18 +14,19 @@
 
 enum { EITS_SCRATCH_ROWS = 8, EITS_SCRATCH_PIXELS = 3 };
 
-/* A reference that follows the skin. Written by frame/follow. */
-typedef struct eits_follow {
+/* Reference tracking: the mean under way, and what it is compared with. Written by
+ * frame/reference_tracking. */
+typedef struct eits_reference_tracking {
     uint32_t seen;    /* frames since the reference was taken */
-    uint32_t touches; /* touches in the last one; EITS_FOLLOW_UNKNOWN: not known, or of no use */
-    uint32_t rest;    /* frames like it that are yet to pass */
-    uint32_t frames;  /* frames on end behind those whose differences are in the reference's m2 */
-    uint32_t open;    /* 1: so is one whose touches have not been counted */
-    uint32_t means;   /* means of such frames since the number of touches changed */
-    eits_real gain;  /* beside touches: of the frame over the reference, as the first mean had it */
-    eits_real level; /* max(S'y) of untouched skin, as the first of it had it; 0: not known */
-} eits_follow;
-#define EITS_FOLLOW_UNKNOWN UINT32_MAX
+    uint32_t touches; /* touches in the last frame; EITS_TOUCHES_UNKNOWN: it cannot be used */
+    uint32_t rest;    /* frames with as many touches that must pass before a mean begins */
+    uint32_t frames;  /* consecutive frames whose differences are summed in the reference's m2 */
+    uint32_t open;    /* 1: the last frame's difference is summed, its touches are not known yet */
+    uint32_t means;   /* means since the number of touches changed */
+    eits_real gain;   /* with touches: the frame's size over the reference's in the first mean */
+    eits_real level;  /* max(S'y) of the untouched skin in the first mean; 0: not known */
+} eits_reference_tracking;
+#define EITS_TOUCHES_UNKNOWN UINT32_MAX
 
 /* The reference frame and its noise. Written by frame/reference. */
 typedef struct eits_reference {
@@ -53,7 +54,7 @@ typedef struct eits_reference {
     eits_real noise_v;
     eits_real lambda_noise;
     uint32_t outliers;
-    eits_follow follow;
+    eits_reference_tracking tracking;
     /* n_rows. While several frames are learned from: sum of squared deviations, in m2_unit^2; while
      * the reference follows the skin: sum of differences, NaN for a row that one of them lacks */
     eits_real *m2;
@@ -170,10 +171,6 @@ typedef struct eits_touch_memory {
     eits_real *atoms;      /* EITS_MAX_TOUCHES x stride: what the skin answers to each disc */
     eits_real *y_separate; /* stride: y less the touches' interaction */
 } eits_touch_memory;
-
-/* Columns that the test of touches has room for: eight parameters each of eight touches, four each
- * of sixteen. */
-enum { EITS_EVIDENCE_COLUMNS = 64 };
 
 /* Memory of the test of touches. Written by evidence. */
 typedef struct eits_evidence {

@@ -1,5 +1,5 @@
-/* What is a choice in this room, with its reason. Written by tables/make_tables.py from
- * tables/constants.toml. */
+/* The numbers of this module that are a choice, with their reasons. Written by
+ * tables/make_tables.py from tables/constants.toml. */
 #ifndef EITSKIN_DIAGNOSTICS_CONSTANTS_H
 #define EITSKIN_DIAGNOSTICS_CONSTANTS_H
 
@@ -144,8 +144,9 @@
 /* of the score [log odds]. larger: fewer frames are crowded */
 #define EITS_CROWD_OFFSET R(-0.3583)
 
-/* by touch, of CROWD_ELECTRODES [log odds each]. nearer 0: many touches pass unreported */
-#define EITS_CROWD_TOUCHES R(-0.2429)
+/* by touch, over the number of electrodes; fitted on a skin of 16, other numbers were not measured
+ * [log odds each]. nearer 0: many touches pass unreported */
+#define EITS_CROWD_TOUCHES R(-3.8864)
 
 /* by the least distance over the sum of the radii [log odds]. larger: overlapping touches count for
  * more */
@@ -170,10 +171,6 @@
 
 /* ---- Chosen: by hand, as limits of the score's features and of where it is asked; not measured.
  * Check: ctest --preset host -R diagnostic_limits */
-
-/* of the skin it was fitted on [electrodes]. larger: fewer touches are too many; other skins are
- * scaled by it, which was not measured */
-#define EITS_CROWD_ELECTRODES R(16.0)
 
 /* at most this [sums of radii]. larger: the far ones are separated */
 #define EITS_CROWD_FAR R(2.0)

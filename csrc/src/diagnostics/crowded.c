@@ -51,9 +51,8 @@ static eits_real score(const eits_context *ctx, const eits_touch *touches, uint3
     const eits_real clear = weakest < EITS_CROWD_CLEAR * EITS_CROWD_CLEAR * left
                                 ? eits_sqrt(weakest / left)
                                 : EITS_CROWD_CLEAR;
-    eits_real sum =
-        eits_fma(EITS_CROWD_TOUCHES * EITS_CROWD_ELECTRODES / (eits_real)ctx->model->n_electrodes,
-                 (eits_real)count, EITS_CROWD_OFFSET);
+    eits_real sum = eits_fma(EITS_CROWD_TOUCHES / (eits_real)ctx->model->n_electrodes,
+                             (eits_real)count, EITS_CROWD_OFFSET);
     sum = eits_fma(EITS_CROWD_NEAREST, nearest(touches, count), sum);
     sum = eits_fma(EITS_CROWD_WIDEST, widest / ctx->options.touch_seed_radius_mm, sum);
     sum = eits_fma(EITS_CROWD_LEFT, eits_sqrt(left), sum);

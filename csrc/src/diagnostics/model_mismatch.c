@@ -138,9 +138,9 @@ void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient)
 int eits_check_drift(eits_context *ctx)
 {
     const eits_real level = ctx->info.lambda_noise > 0 ? eits_detection_threshold(ctx)
-                                                       : ctx->reference.follow.level,
+                                                       : ctx->reference.tracking.level,
                     clear = level > 0 ? ctx->info.lambda_max / level : EITS_DRIFT_CLEAR;
-    if (!eits_follows(ctx) || ctx->model->precision == NULL ||
+    if (!eits_tracks_reference(ctx) || ctx->model->precision == NULL ||
         !eits_wants(ctx, EITS_DIAGNOSTIC_STALE_REFERENCE) || clear > EITS_DRIFT_CLEAR ||
         !(ctx->info.unexplained > EITS_DRIFT_UNEXPLAINED * (1 + clear)))
         return 0;

@@ -12,10 +12,11 @@ _Static_assert(EITS_FAST_MAX_ROWS == EITS_FAST_ROWS, "the header's");
 _Static_assert(EITS_FAST_HELD == EITS_FAST_WAITING, "the header's");
 
 /* A touch's place in the state: x, y, strength, and speeds. */
-enum { FAST_X = 0, FAST_Y = 1, FAST_C = 2, FAST_VX = 3, FAST_VY = 4, FAST_SIZE = 5 };
+enum { FAST_X = 0, FAST_Y = 1, FAST_C = 2, FAST_VX = 3, FAST_VY = 4 };
+enum { FAST_SIZE = EITS_FAST_STATE_NUMBERS };
 enum { FAST_NUMBERS = FAST_SIZE * EITS_FAST_MAX_TOUCHES };
 /* An answer and its derivatives by x and y. */
-enum { FAST_WAYS = 3 };
+enum { FAST_WAYS = EITS_FAST_ANSWER_NUMBERS };
 
 typedef struct fast_drive {
     uint16_t first, count; /* in `row` */
@@ -117,6 +118,7 @@ struct eits_fast {
 
 _Static_assert(sizeof(fast_drive) <= EITS_FAST_DRIVE, "the header counts it");
 _Static_assert(sizeof(struct eits_fast) <= EITS_FAST_STATE, "the header counts it");
+_Static_assert(sizeof(struct eits_fast) + 256 > EITS_FAST_STATE, "the header counts too much");
 
 static inline eits_real fast_square(eits_real value)
 {

@@ -48,33 +48,19 @@ static void *take(uint8_t **next, size_t bytes)
     return taken;
 }
 
-static eits_real *take_reals(uint8_t **next, size_t count)
-{
-    return take(next, count * sizeof(eits_real));
-}
+/* By the lists that EITS_FAST_SIZE adds up (eitskin/fast.h). */
+#define TAKE_INTO(part, place, element, count)                               \
+    _Static_assert(sizeof *(part)->place == sizeof(element), "its element"); \
+    (part)->place = take(&next, (size_t)(count) * sizeof(element));
+#define TAKE(place, element, count)         TAKE_INTO(fast, place, element, count)
+#define TAKE_WAITING(place, element, count) TAKE_INTO(held, place, element, count)
 
-/* EITS_FAST_SIZE counts what is taken here. */
 static void lay_out(uint8_t *next, const eits_model *model, shape s, eits_fast *fast)
 {
-    const size_t rows = s.most_rows, triangle = EITS_FAST_TRIANGLE(rows);
-    const size_t cells = EITS_FAST_CELLS(model->nx, model->ny);
     fast->drive = take(&next, s.drives * sizeof *fast->drive);
-    fast->row = take(&next, model->n_rows * sizeof *fast->row);
-    fast->cell = take(&next, cells * sizeof *fast->cell);
-    fast->masked = take(&next, model->n_rows);
-    fast->used = take(&next, rows);
-    fast->gain = take_reals(&next, model->n_rows);
-    eits_real **const of_rows[] = {&fast->z, &fast->along, &fast->e, &fast->white, &fast->spare};
-    for (size_t k = 0; k < sizeof of_rows / sizeof of_rows[0]; ++k)
-        *of_rows[k] = take_reals(&next, rows);
-    fast->answer = take_reals(&next, EITS_FAST_MAX_TOUCHES * FAST_WAYS * rows);
-    fast->moved = take_reals(&next, FAST_NUMBERS * rows);
-    fast->factor = take_reals(&next, triangle);
-    fast->score = take_reals(&next, cells);
-    fast->pair_score = take_reals(&next, cells);
-    for (uint32_t n = 0; n < EITS_FAST_HELD; ++n) {
-        fast->held[n].white = take_reals(&next, rows);
-        fast->held[n].factor = take_reals(&next, triangle);
+    EITS_FAST_ARRAYS(TAKE, model->n_rows, s.most_rows, model->nx, model->ny)
+    for (fast_held *held = fast->held; held < fast->held + EITS_FAST_HELD; ++held) {
+        EITS_FAST_WAITING_ARRAYS(TAKE_WAITING, s.most_rows)
     }
 }
 

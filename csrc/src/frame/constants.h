@@ -1,5 +1,5 @@
-/* What is a choice in this room, with its reason. Written by tables/make_tables.py from
- * tables/constants.toml. */
+/* The numbers of this module that are a choice, with their reasons. Written by
+ * tables/make_tables.py from tables/constants.toml. */
 #ifndef EITSKIN_FRAME_CONSTANTS_H
 #define EITSKIN_FRAME_CONSTANTS_H
 
@@ -18,10 +18,6 @@
  * that disagrees [rms log ratio]. larger: harm on instruments that differ; smaller: off on very
  * uneven sheets */
 #define EITS_MAX_DISTANCE R(0.28)
-
-/* the least regularisation on such an instrument [of s_1^2]. larger: fewer details; smaller: the
- * instrument's errors become touches */
-#define EITS_FAR_REGULARISATION R(1.0)
 
 /* beyond this difference of rows and their reciprocals, row gains are off [of the reference's rms].
  * as MAX_DISTANCE */
@@ -92,17 +88,9 @@
  * changes little; smaller: noisy boards keep noise */
 #define EITS_MAX_REGULARISATION R(1.0)
 
-/* a lift by less is none [of the model's mu]. larger: steps that show; smaller: pays weights in
- * every product for nothing */
-#define EITS_REGULARISATION_KEPT R(1.01)
-
 /* how little a direction that no row sees is held to zero [of mu]. larger: biases directions that
  * are seen; smaller: the factor's pivots are rounding */
 #define EITS_LOST R(0.01)
-
-/* least pivot of the rows' products [of LOST mu]. as LOST, and met only where rounding is as
- * large */
-#define EITS_LOST_PIVOT R(0.5)
 
 /* F leaves so much room below the stated Lipschitz constant [of |S_1|^2]. larger: rounding may
  * exceed the constant and FISTA rises; smaller: shorter steps */
@@ -112,26 +100,26 @@
  * change; smaller: a rougher lambda_noise. They are orthogonal within each eight directions */
 #define EITS_NOISE_PROBES 8
 
-/* ---- Chosen: by hand; FOLLOW_TOUCH on the streams of DRIFT_UNEXPLAINED: false touches stop the
- * reference in five of seven with .6, in one with .7, in none from .75 on; measured presses have
- * .83 and more (95 %). Check: eitskin study teaching --data FOLDER */
+/* ---- Chosen: by hand; REFERENCE_TRACKING_TOUCH on the streams of DRIFT_UNEXPLAINED: false touches
+ * stop the reference in five of seven with .6, in one with .7, in none from .75 on; measured
+ * presses have .83 and more (95 %). Check: eitskin study teaching --data FOLDER */
 
 /* a reference that follows goes as large a part of the way at once, after as large a part of
  * reference_frames. larger: follows a touch sooner after it is lifted; smaller: goes further on one
  * mean */
-#define EITS_FOLLOW_PARTS 16
+#define EITS_REFERENCE_TRACKING_PARTS 16
 
 /* a mean difference of which one column gives more looks like a touch, and is not followed [of
  * |y|^2]. larger: light touches are followed; smaller: drift at one place is not */
-#define EITS_FOLLOW_TOUCH R(0.75)
+#define EITS_REFERENCE_TRACKING_TOUCH R(0.75)
 
 /* a greater change of its size at once, under touches, is not followed [of the reference]. larger:
  * what a hand does may count; smaller: fast drying is not followed */
-#define EITS_FOLLOW_GAIN R(0.02)
+#define EITS_REFERENCE_TRACKING_GAIN R(0.02)
 
 /* what must be left of the reference, or of a touch's column, beside the columns of touches [of its
  * square]. larger: gives up near many touches; smaller: rounding tells the gain */
-#define EITS_FOLLOW_LEFT R(0.01)
+#define EITS_REFERENCE_TRACKING_LEFT R(0.01)
 
 /* clang-format on */
 

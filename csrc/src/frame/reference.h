@@ -1,5 +1,5 @@
-/* What the public eits_reference_* functions are made of (api/reference.c): none of these looks for
- * outliers, and none measures a frame. */
+/* The steps of the public eits_reference_* functions (api/reference.c). Outliers are searched for
+ * elsewhere (diagnostics/reference_outliers.c). */
 #ifndef EITSKIN_REFERENCE_H
 #define EITSKIN_REFERENCE_H
 
@@ -20,20 +20,20 @@ void eits_learn_row_gains(eits_context *ctx);
 /* The greatest power of two up to the greatest voltage in use, within what has an inverse. */
 eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame);
 
-/* The rms over rows of the frames' deviation, so far; 0 where it is out of range. */
+/* The rms over rows of the deviation of the frames so far, V; 0 if it is out of range. */
 eits_real eits_reference_noise(const eits_context *ctx);
 
 /* The least noise of a row, V: the option's, or what rounding leaves. */
 eits_real eits_noise_floor_v(const eits_context *ctx);
 
-/* max(S'y) of that, with all rows in use. */
+/* max(S'y) of noise of that size, with all rows in use. */
 eits_real eits_lambda_noise_floor(const eits_context *ctx);
 
 /* Take one more frame into the mean and the squares; rows that were masked lose their reference. */
 void eits_take_reference_frame(eits_context *ctx, const eits_real *frame);
 
-/* The second frame waits in m2 until a third tells which of them is right where they differ; then
- * it is taken in from there. */
+/* The second frame waits in m2 until a third one decides which of the two is right where they
+ * differ; then it is taken from there into the mean. */
 void eits_keep_second_frame(eits_context *ctx, const eits_real *frame);
 void eits_take_second_frame(eits_context *ctx);
 
@@ -51,23 +51,24 @@ void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain,
 /* reference.place_mm2 and shift_mm from them. */
 void eits_learn_places(eits_context *ctx, const eits_place_sums *sums);
 
-/* ---- follow.c ---- */
+/* ---- reference_tracking.c ---- */
 
-/* Whether frames follow one another here, and for long enough to be told from single ones: after a
- * sixteenth of the time constant. */
-int eits_follows(const eits_context *ctx);
+/* Whether the reference has been tracked for long enough that its drift can be judged: after a
+ * sixteenth of the time constant. Single frames never are. */
+int eits_tracks_reference(const eits_context *ctx);
 
-/* A frame was solved: its difference joins those at hand, until eits_follow_end says what it shows.
- */
-void eits_follow_add(eits_context *ctx, const eits_real *frame);
+/* A frame was solved: add its difference from the reference to the mean under way.
+ * eits_reference_tracking_end then says which touches it had. */
+void eits_reference_tracking_add(eits_context *ctx, const eits_real *frame);
 
-/* Let go of the frames at hand: what comes has nothing to do with them. */
-void eits_follow_break(eits_context *ctx);
+/* Drop the mean under way: the frames to come have nothing to do with it. */
+void eits_reference_tracking_break(eits_context *ctx);
 
-/* The frame added last shows these touches, and with tentative and held ones `followed`;
- * EITS_FOLLOW_UNKNOWN: it is of no use. Returns 1 where the reference moved; adds to `macs`.
- * Overwrites frame.d and scratch. */
-int eits_follow_end(eits_context *ctx, const eits_scratch *scratch, const eits_touch *touches,
-                    uint32_t count, uint32_t followed, uint64_t *macs);
+/* The frame added last has the `count` touches; `followed` is their number together with tentative
+ * and held ones, or EITS_TOUCHES_UNKNOWN if the frame cannot be used. Returns 1 if the reference
+ * moved; adds to `macs`. Overwrites frame.d and scratch. */
+int eits_reference_tracking_end(eits_context *ctx, const eits_scratch *scratch,
+                                const eits_touch *touches, uint32_t count, uint32_t followed,
+                                uint64_t *macs);
 
 #endif

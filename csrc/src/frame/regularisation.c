@@ -23,17 +23,15 @@ static eits_real asked_regularisation(const eits_context *ctx)
     const eits_reference *b = &ctx->reference;
     const eits_real by_noise =
         b->noise_v > 0 ? ctx->options.regularisation_noise_factor * (b->noise_v / b->v0_rms) : 0;
-    /* an instrument that disagrees has no finer truth to tell than its strongest directions */
-    const eits_real asked =
-        b->far && by_noise < EITS_FAR_REGULARISATION ? EITS_FAR_REGULARISATION : by_noise;
-    return asked < EITS_MAX_REGULARISATION ? asked : EITS_MAX_REGULARISATION;
+    /* the frames of an instrument that differs from the model are right in its strongest
+     * directions only */
+    return !b->far && by_noise < EITS_MAX_REGULARISATION ? by_noise : EITS_MAX_REGULARISATION;
 }
 
-/* A lift of a per cent would cost weights in every product and change nothing that can be seen. */
 eits_real eits_regularisation_of_all(const eits_context *ctx)
 {
     const eits_real asked = asked_regularisation(ctx);
-    return asked > EITS_REGULARISATION_KEPT * ctx->whitening.mu ? asked : ctx->whitening.mu;
+    return asked > ctx->whitening.mu ? asked : ctx->whitening.mu;
 }
 
 eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing)

@@ -75,7 +75,7 @@ uint64_t eits_fill_build(eits_context *ctx, const eits_scratch *scratch)
             add_row(ctx, i, row_of(ctx, f, i), -z[i], z);
         macs += (uint64_t)a * rank + triangle_macs(ctx);
     }
-    macs += eits_triangle_factor(ctx, EITS_LOST_PIVOT * EITS_LOST * EITS_LOST, f);
+    macs += eits_triangle_factor(ctx, EITS_LOST * EITS_LOST, f);
     ctx->whitening.form = eits_all_finite(f, EITS_PADDED_TRIANGLE(rank)) ? EITS_WHITENING_TRIANGLE
                                                                          : EITS_WHITENING_STORED;
     return macs;

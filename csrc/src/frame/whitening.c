@@ -204,7 +204,7 @@ static uint64_t build_triangle(eits_context *ctx, const eits_scratch *scratch,
         EITS_STEP_MARGIN * ctx->whitening.s1_square * (1 + regularisation) / (1 + lost);
     eits_real *f = ctx->whitening.map, *g = ctx->whitening.metric;
     uint64_t macs = sum_products(ctx, scratch, missing, lost, f);
-    macs += eits_triangle_factor(ctx, EITS_LOST_PIVOT * lost, f);
+    macs += eits_triangle_factor(ctx, lost, f);
     macs += factor_metric(ctx, scratch, regularisation, f, g);
     macs += finish_whitening(ctx, eits_sqrt(ctx->whitening.square), g, f);
     ctx->whitening.form = eits_all_finite(f, 2u * EITS_PADDED_TRIANGLE(ctx->model->rank))

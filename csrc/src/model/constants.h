@@ -1,5 +1,5 @@
-/* What is a choice in this room, with its reason. Written by tables/make_tables.py from
- * tables/constants.toml. */
+/* The numbers of this module that are a choice, with their reasons. Written by
+ * tables/make_tables.py from tables/constants.toml. */
 #ifndef EITSKIN_MODEL_CONSTANTS_H
 #define EITSKIN_MODEL_CONSTANTS_H
 
@@ -13,11 +13,12 @@
  * away beyond its places gives absurd forces; smaller: cuts off gains that were measured */
 #define EITS_MAX_GAIN R(4.0)
 
-/* ---- Chosen: by hand: ten seconds at 50 frames a second. Check: ctest --preset host -R follow */
+/* ---- Chosen: by hand: ten seconds at 50 frames a second. Check: ctest --preset host -R
+ * reference_tracking */
 
 /* reference_frames of a model that asks for it [frames]. larger: drift shows as touches; smaller:
  * slow touches are followed */
-#define EITS_FOLLOW_FRAMES 512
+#define EITS_REFERENCE_TRACKING_FRAMES 512
 
 /* ---- Chosen: on tuning streams (the study's, seed 100001 by default): no other number of
  * confirmations, smoothing or threshold has more exact frames at 40 dB; holding for 0 or 1 frame

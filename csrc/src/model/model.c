@@ -282,7 +282,7 @@ static int defaults_in_range(const eits_model *model)
     return d->iterations <= EITS_MAX_MODEL_ITERATIONS &&
            d->solver <= (uint32_t)EITS_SOLVER_ACTIVE_SET &&
            d->touch_fit_left_out <=
-               (EITS_TOUCH_FIT_ALL | EITS_GAIN_DRIFT_KEPT | EITS_REFERENCE_FOLLOWS) &&
+               (EITS_TOUCH_FIT_ALL | EITS_GAIN_DRIFT_KEPT | EITS_TRACKS_REFERENCE) &&
            eits_between(d->mask_threshold, 0, 1) && eits_options_in_range(&own);
 }
 

@@ -28,7 +28,7 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
     options->touch_fit = EITS_TOUCH_FIT_ALL & ~d->touch_fit_left_out;
     options->project_reference = (d->touch_fit_left_out & EITS_GAIN_DRIFT_KEPT) == 0;
     options->reference_frames =
-        (d->touch_fit_left_out & EITS_REFERENCE_FOLLOWS) != 0 ? EITS_FOLLOW_FRAMES : 0;
+        (d->touch_fit_left_out & EITS_TRACKS_REFERENCE) != 0 ? EITS_REFERENCE_TRACKING_FRAMES : 0;
     options->touch_seek = !options->project_reference; /* in a taught model */
     return EITS_OK;
 }

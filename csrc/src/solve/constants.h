@@ -1,5 +1,5 @@
-/* What is a choice in this room, with its reason. Written by tables/make_tables.py from
- * tables/constants.toml. */
+/* The numbers of this module that are a choice, with their reasons. Written by
+ * tables/make_tables.py from tables/constants.toml. */
 #ifndef EITSKIN_SOLVE_CONSTANTS_H
 #define EITSKIN_SOLVE_CONSTANTS_H
 
@@ -25,13 +25,9 @@
  * several columns at once may undo each other, and no round with one alone is tried */
 #define EITS_MAX_STALLS 2
 
-/* a rise by less is rounding, by more a step too long [of the objective]. larger: divergence is
- * found late; smaller: rounding halves the step */
+/* a rise by less is rounding, by more a step too long; so is a gap of an image of zeros, of |y|^2 /
+ * 2 [of the objective]. larger: divergence is found late; smaller: rounding halves the step */
 #define EITS_MAX_RISE R(0.001)
-
-/* an image of zeros with a larger gap was thrown there by too long a step [of |y|^2 / 2]. as
- * MAX_RISE */
-#define EITS_ZERO_GAP R(0.001)
 
 /* data with less are zero: 2^24 (2^53) times the smallest normal number, so that its rounding is
  * normal [of |y|^2]. larger: tiny data have no image; smaller: their gap is rounding */

@@ -203,7 +203,7 @@ static void iterate_to_the_end(eits_context *ctx, const eits_scratch *scratch, e
         gap_known = 1;
         /* too long a step may also throw all coefficients beyond their sign, to zero: then the gap
          * is that of the start */
-        if (!(c.objective <= ceiling) || (none && c.gap > EITS_ZERO_GAP * scale)) {
+        if (!(c.objective <= ceiling) || (none && c.gap > EITS_MAX_RISE * scale)) {
             if (ctx->info.step_halvings == EITS_MAX_STEP_HALVINGS || k == o->iterations) {
                 ctx->info.stop = EITS_STOP_DIVERGED;
                 break;

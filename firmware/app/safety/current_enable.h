@@ -15,8 +15,8 @@ typedef struct fw_safety fw_safety;
 #define FW_SILENT_US 900000u
 #define FW_SENSE_US  50000u /* between two measurements of the current */
 
-/* A host asks for frames. Returns false after a trip: the current exceeded its limit, and nobody
- * has cleared the faults since. */
+/* A host asks for frames. Returns false after a trip: the current exceeded its limit, and
+ * the faults have not been cleared since. */
 bool fw_current_on(fw_safety *safety);
 
 /* Withdraw the permission; the current has stopped when this returns. */

@@ -1,5 +1,5 @@
-/* What is a choice in this room, with its reason. Written by tables/make_tables.py from
- * tables/constants.toml. */
+/* The numbers of this module that are a choice, with their reasons. Written by
+ * tables/make_tables.py from tables/constants.toml. */
 #ifndef EITSKIN_FIRMWARE_CONSTANTS_H
 #define EITSKIN_FIRMWARE_CONSTANTS_H
 

@@ -1,4 +1,4 @@
-/* The emulated board as the application sees it; its files are in the folder where QEMU runs. */
+/* The emulated board, for the application; its files are in the folder in which QEMU runs. */
 #include "mps2.h"
 
 #include <stdlib.h>
@@ -14,7 +14,7 @@ static void feed_watchdog(void *ctx)
     (void)ctx;
 }
 
-/* There is nothing to come back to: what the run wrote is in the files. */
+/* A reset ends the run, whose output is in the files. */
 static void restart(void *ctx)
 {
     (void)ctx;
@@ -72,6 +72,6 @@ int main(void)
         .workspace_bytes = sizeof workspace,
     };
     const int status = fw_run(&board);
-    (void)mps2_lock(NULL); /* a slot's interrupt during exit would find the board gone */
+    (void)mps2_lock(NULL); /* no slot's interrupt may come during exit */
     return status;
 }

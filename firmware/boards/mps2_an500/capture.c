@@ -1,4 +1,4 @@
-/* Slots by timer 1: it interrupts when a burst has ended. */
+/* Slots: timer 1 interrupts when a burst has ended. */
 #include "mps2.h"
 
 #include <stdlib.h>
@@ -37,7 +37,7 @@ static fw_status configure(void *ctx, const fw_capture_setup *setup,
     return FW_OK;
 }
 
-/* Interrupt when the burst that is due ends. */
+/* Set the timer to the end of the next burst. */
 static void await_burst(void)
 {
     const int32_t wait_us = (int32_t)(capture.start_us + capture.burst_us - mps2_time_us(NULL));
@@ -91,10 +91,10 @@ void mps2_slot_irq(void)
     mps2_wake();
     while (capture.running && (int32_t)(mps2_time_us(NULL) - capture.start_us - capture.burst_us -
                                         capture.setup.slot_us) >= 0)
-        next_burst(true); /* this interrupt came later than the next burst's end */
+        next_burst(true); /* this interrupt came after the next burst had ended */
     if (capture.running)
         next_burst(false);
-    /* the end of the run is the end of the skin: the application comes to rest */
+    /* after the last frame of the skin the application may finish */
     if (capture.running && !mps2_link_ended(NULL))
         await_burst();
 }

@@ -1,4 +1,4 @@
-/* What comes from the folder where QEMU runs. */
+/* Files from the folder in which QEMU runs. */
 #include "mps2.h"
 
 #include <stdlib.h>

@@ -1,6 +1,6 @@
-/* The link as files: what the host sends is in "link_in.bin", records of u32 time_us, u32 size and
- * bytes, each given when the board's clock has come to its time; one of no bytes ends the run. What
- * the board sends is in "link_out.bin". */
+/* The link as files. "link_in.bin" has the bytes from the host, in records of u32 time_us, u32 size
+ * and bytes. Each is delivered when the board's clock reaches its time; a record without bytes ends
+ * the run. "link_out.bin" gets the bytes from the board. */
 #include "mps2.h"
 
 #include <string.h>
@@ -8,7 +8,7 @@
 enum { MAX_BYTES = 768 * 1024 };
 
 static uint8_t input[MAX_BYTES];
-static size_t input_bytes, at, left; /* left: of the record that is being given */
+static size_t input_bytes, at, left; /* left: bytes of the present record */
 static bool over;
 static FILE *output;
 

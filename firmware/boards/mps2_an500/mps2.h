@@ -1,9 +1,9 @@
-/* The board that QEMU's mps2-an500 makes: an instrument whose skin, link and flash are files
+/* A board on QEMU's mps2-an500: an instrument whose skin, link and flash are files
  * (docs/guide/hardware.md).
  *
- * Its clock counts instructions: run with -icount shift=6, an instruction takes 64 ns of QEMU's
- * time, which are 1.6 ticks of a 25 MHz timer, and 5 ns of the board's, as if 200 MHz did one
- * instruction a cycle. Runs are reproducible to the bit. */
+ * Its clock counts instructions. With -icount shift=6 an instruction takes 64 ns of QEMU's time,
+ * which are 1.6 ticks of a 25 MHz timer. It counts as 5 ns of the board's time, as at 200 MHz with
+ * one instruction per cycle. Runs are reproducible to the bit. */
 #ifndef MPS2_H
 #define MPS2_H
 
@@ -37,8 +37,8 @@ void mps2_unlock(void *ctx, uint32_t state);
 void mps2_wake(void);
 void mps2_wait(void *ctx); /* until mps2_wake, or at most 1 ms */
 void mps2_timebase_start(void);
-/* What the world does takes no board time: between these two calls the board's timers stand still.
- */
+/* Work of the simulated world takes no board time: between these two calls the board's timers stand
+ * still. */
 void mps2_hold_time(void);
 void mps2_release_time(void);
 
@@ -48,7 +48,7 @@ size_t mps2_load(const char *name, void *bytes, size_t room);
 __attribute__((noreturn)) void mps2_fail(const char *what);
 
 void mps2_skin_start(void);
-/* Codes of a burst as the skin, the multiplexers and the generator make them. */
+/* The codes of a burst, from the skin, the multiplexers and the generator. */
 void mps2_skin_burst(uint16_t *codes, uint32_t samples, uint32_t sample_rate_hz, uint32_t start_us,
                      uint32_t scanning_us);
 void mps2_link_start(void);

@@ -1,11 +1,11 @@
-/* The analog side: what was written to the AD9833, which electrodes the multiplexers connect, and
- * the voltages from "skin.bin":
+/* The analog side: the state of the AD9833, the electrodes that the multiplexers connect, and the
+ * voltages from "skin.bin":
  *
  *   u32 rows, u32 frames, u32 frame_us; rows x 4 u8 electrodes I+, I-, V+, V-; frames x rows f32
  * volts, amplitude
  *
- * A frame lasts frame_us from the start of the scan on, the last one for ever. Electrodes that are
- * no row's read 0 V. */
+ * Each frame lasts frame_us, counted from the start of the scan; the last one stays. Electrodes
+ * that do not form a row read 0 V. */
 #include "boards/parts/ad9833_model.h"
 #include "mps2.h"
 
@@ -14,7 +14,7 @@
 
 enum { MAX_BYTES = 1024 * 1024, LINES = 20 };
 #define PHASE_BITS 28
-#define LATE_RAD   0.7f /* of the voltages against the generator: cables, filters, skin */
+#define LATE_RAD   0.7f /* phase of the voltages behind the generator: cables, filters, skin */
 
 static _Alignas(4) uint8_t file_bytes[MAX_BYTES];
 static struct {

@@ -1,5 +1,5 @@
 /* Start of a Cortex-M7 under QEMU's mps2-an500: vectors, FPU on, zeroed memory, semihosting, main.
- * Programs without an interrupt leave its handler out. */
+ * A program that does not use an interrupt omits its handler. */
 #include <stdint.h>
 #include <stdlib.h>
 
@@ -43,7 +43,7 @@ static void fault(void)
     _Exit(70);
 }
 
-/* newlib's exit asks for these where no start files are linked */
+/* newlib's exit needs these if no start files are linked */
 void _init(void);
 void _fini(void);
 void _init(void)

@@ -1,4 +1,4 @@
-/* Flash in memory: erased, then "bank0.bin" and "bank1.bin" where there are such. */
+/* Flash in memory: erased, or with the contents of "bank0.bin" and "bank1.bin" if they exist. */
 #include "boards/parts/nor_model.h"
 #include "mps2.h"
 

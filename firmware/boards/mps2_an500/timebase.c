@@ -1,5 +1,4 @@
-/* Board time by timer 0, which stands still while the world does something; and what waits for
- * it. */
+/* Board time by timer 0, which stands still while the simulated world works; and waiting. */
 #include "boards/parts/later.h"
 #include "mps2.h"
 
@@ -20,7 +19,7 @@ void mps2_unlock(void *ctx, uint32_t state)
     __asm volatile("msr primask, %0" ::"r"(state) : "memory");
 }
 
-/* The timer wraps every 13 s of board time; the application looks more often. */
+/* The timer wraps every 13 s of board time; the application reads it more often. */
 uint32_t mps2_time_us(void *ctx)
 {
     const uint32_t state = mps2_lock(ctx), ticks = TIMER_VALUE(TIMER_TIME);
@@ -61,8 +60,7 @@ void mps2_wake(void)
     woken = true;
 }
 
-/* Not WFI: QEMU lets its clock run with the host's while the processor sleeps, and runs would
- * differ. */
+/* Not WFI: while the processor sleeps, QEMU's clock follows the host's, and runs would differ. */
 void mps2_wait(void *ctx)
 {
     const uint32_t start = mps2_time_us(ctx);

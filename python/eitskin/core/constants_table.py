@@ -4,7 +4,7 @@ tables/make_tables.py from tables/constants.toml.
 
 # model
 MAX_GAIN = 4.0
-FOLLOW_FRAMES = 512
+REFERENCE_TRACKING_FRAMES = 512
 TRACK_DETECTION = 0.75
 TRACK_CONFIRM = 2
 TRACK_HOLD = 2

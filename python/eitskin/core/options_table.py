@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS
 
-# eits_sign: Which conductivity changes are looked for.
+# eits_sign: Which conductivity changes the image may have.
 SIGNS = ("increase", "decrease", "both")
-# eits_solver: How an image is found; each minimises the same objective (solve.h).
+# eits_solver: The method that finds the image; all minimise the same objective (solve.h).
 SOLVERS = ("fista", "working-set", "active-set")
 # eits_touch_fit: Bits: what the touch fit does beyond fitting discs to the image's peaks.
 LOG_DATA = 1
@@ -23,77 +23,85 @@ class OptionFields:
     and ranges.
     """
 
-    iterations: int  # the most iterations; exactly so many where gap_rel is 0
-    max_touches: int  # the most touches that are reported; the model's number by default
-    max_masked: int  # the core rejects a frame with more unusable rows; half of the rows by default
+    iterations: int  # the maximum number of iterations; FISTA runs exactly so many if gap_rel is 0
+    max_touches: int  # the maximum number of touches that are reported; by default the model's
+    # the core rejects a frame in which more rows cannot be used; by default half of the rows
+    max_masked: int
     solver: str  # fista, working-set or active-set (solve.h)
-    # 1: ignore changes along the reference frame, that is drift of the gain; 0 by default in taught
-    # models
+    # 1: ignore changes along the reference frame, that is, drift of the gain; the default is 1, in
+    # taught models 0
     project_reference: bool
-    lambda_rel: float  # lambda, where lambda_abs is 0, is at least this fraction of lambda_max
-    lambda_noise_factor: float  # and at least this multiple of lambda_noise
-    # no touch where lambda_max < detection_factor lambda_noise; 0: no such threshold
+    lambda_rel: float  # lambda is at least this fraction of lambda_max, unless lambda_abs is given
+    # lambda is at least this multiple of lambda_noise, unless lambda_abs is given
+    lambda_noise_factor: float
+    # a frame has no touch if lambda_max < detection_factor lambda_noise; 0: no threshold
     detection_factor: float
     touch_threshold: float  # a local maximum below this fraction of the greatest starts no touch
     # a touch that explains less than this fraction of |y|^2 beside the others is dropped
     touch_min_fraction: float
     touch_min_radius_mm: float  # the least radius of a touch
-    touch_max_radius_mm: float  # the greatest
-    touch_seed_radius_mm: float  # the radius that a fit starts from, between the two
+    touch_max_radius_mm: float  # the greatest radius of a touch
+    touch_seed_radius_mm: float  # the radius from which a fit starts, between the other two
     # expected conductivity change under a touch, which separates radius from strength; 0: unknown
     touch_change_s_per_m: float
-    # weight of the radius so expected against the data, relative to the touch's own energy
+    # weight, against the data, of the radius that touch_change_s_per_m implies, relative to the
+    # touch's own energy
     touch_radius_weight: float
-    follow_mm: float  # a touch that moved at most so far since the last frame keeps its id
-    # 1: discs start where the data answer most, one after the other, each sought again beside the
-    # others, and not at the image's peaks; the default in taught models
+    # a touch keeps its id if it moved by at most this distance since the last frame
+    follow_mm: float
+    # 1: discs start where they explain most of the data, one after the other, and each is placed
+    # again beside the others; 0: they start at the image's peaks. The default is 0, in taught
+    # models 1
     touch_seek: bool
-    # parts of the touch fit, a bit each; all but those that the model leaves out by default
+    # parts of the touch fit, one bit each; by default all that the model does not leave out
     touch_fit: int
-    # > 0: between touches the reference follows the untouched skin, with this time constant in
-    # frames; 0: it stays as it was taken, the default but in taught models. After eits_find_touches
-    # alone, and not in a batch
+    # > 0: reference tracking: while nothing touches the skin, the reference follows it with this
+    # time constant, in frames; 0: the reference stays as it was taken. The default is 0, in taught
+    # models 512. Works only if eits_find_touches is called for each frame, and not in a batch
     reference_frames: int
-    # iterations between checks of the duality gap and of divergence, and until the working set is
+    # iterations between checks of the duality gap and of divergence, and before the working set is
     # chosen again
     gap_every: int = 10
     # the change that is looked for: increase (conducting touches), decrease or both
     sign: str = "increase"
     # 1: start from the last frame's coefficients, momentum reset (solve.h)
     warm_start: bool = False
-    # > 0: this lambda; 0: the greater of those that lambda_rel and lambda_noise_factor give
+    # > 0: lambda itself; 0: lambda is the greater of lambda_rel lambda_max and lambda_noise_factor
+    # lambda_noise
     lambda_abs: float = 0.0
     gap_rel: float = 0.0  # > 0: stop once the duality gap <= gap_rel |y|^2 / 2
-    saturation_v: float = 0.0  # > 0: a channel at or beyond +-saturation_v is unusable, V
+    saturation_v: float = 0.0  # > 0: a row at or beyond +-saturation_v, V, is left out; 0: none is
     # sweeps of the off-grid fit over all touches; 0: peaks with their strengths only
     touch_sweeps: int = 6
     mac_limit: int = 0  # > 0: stop with the best so far before info.macs goes beyond this (solve.h)
-    diagnostics: int = ALL_DIAGNOSTICS  # the diagnostics that are looked for, a bit each
-    # 1: where more than one touch is found, eits_find_touches solves again with their interaction
-    # taken out of the data; image and info are then the second solve's. Not with a mac_limit
+    diagnostics: int = ALL_DIAGNOSTICS  # the diagnostics that are examined, one bit each
+    # 1: if more than one touch is found, eits_find_touches solves the frame again with their
+    # interaction taken out of the data; image and info are then those of the second solve. Ignored
+    # with a mac_limit
     second_pass: bool = False
-    # a tentative touch is reported once it was found in so many frames in a row; 0, 1: at once
+    # a touch is reported after it was found in this many consecutive frames; 0, 1: at once
     track_confirm: int = 0
-    # a touch that is not found keeps its id for so many frames, and is still reported if it was
+    # a touch that is not found keeps its id for this many frames; it is still reported if it was
     # faint before
     track_hold: int = 0
-    # > 0: follow places, radii and strengths in time; how uncertain the place of a touch is whose
-    # S'y is as great as that of noise, in pixels
+    # > 0: smooth places, radii and strengths in time; the value is the uncertainty, in pixels, of
+    # the place of a touch whose S'y equals that of noise
     track_smooth: float = 0.0
-    # the whitening's regularisation is at least this times noise_v / v0_rms, where both are known;
-    # 0: as the model has it
+    # the whitening's regularisation is at least this times noise_v / v0_rms, if both are known; 0:
+    # it is the model's
     regularisation_noise_factor: float = 5.0
-    # 1: where the model says what it may be wrong by, each row's data are multiplied by what makes
-    # its reference the model's, unless the reference says that the instrument differs and not the
-    # skin
+    # 1: each row's data are multiplied by the gain that makes its reference equal to the model's.
+    # Needs a model with section UNCE; not done if the reference shows that the instrument differs
+    # rather than the skin
     row_gains: bool = True
-    # 1: where the model says what it may be wrong by, a touch that such errors could have made is
-    # not reported, and near ones that could be one touch become one
+    # 1: a touch that the model's own errors could have caused is not reported, and close touches
+    # that could be one become one. Needs a model with section UNCE
     touch_test: bool = True
-    # columns that the test of touches may make a frame (about 6 kMAC each at rank 64) beyond a
-    # first look at each touch; then what stands is reported as crowded; 0: any number
+    # the most columns that the touch test may compute per frame (about 6 kMAC each at rank 64)
+    # after a first look at each touch. When they are used up, the touches found so far are reported
+    # as crowded; 0: no limit
     test_columns: int = 200
-    # the noise of a row is at least this, V: of a converter its step over the root of 12
+    # the noise of a row is at least this, V; for a converter, its step over the square root of 12
     noise_floor_v: float = 0.0
 
 

@@ -11,7 +11,7 @@ from eitskin.core.engine import CoreEngine
 from eitskin.errors import EitskinError, ModelError
 from eitskin.fileio import read_bytes, write_bytes
 from eitskin.model.eitm_sections import REQUIRED, Sections, decode_sections, encode_sections
-from eitskin.model.model import GAIN_DRIFT_KEPT, REFERENCE_FOLLOWS, Model
+from eitskin.model.model import GAIN_DRIFT_KEPT, TRACKS_REFERENCE, Model
 
 MAGIC = b"EITM"
 MAJOR, MINOR = 1, 10
@@ -29,7 +29,7 @@ def encode_model(model: Model, sums: bytes = b"") -> bytes:
     sections = encode_sections(model)
     if sums:
         sections["SUMS"] = sums
-    taught = bool(model.defaults.touch_fit_left_out & (GAIN_DRIFT_KEPT | REFERENCE_FOLLOWS))
+    taught = bool(model.defaults.touch_fit_left_out & (GAIN_DRIFT_KEPT | TRACKS_REFERENCE))
     return _assemble(sections, model.protocol.hash, taught)
 
 

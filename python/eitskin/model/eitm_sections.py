@@ -18,7 +18,7 @@ from eitskin.model.force_law import decode_load, encode_load
 from eitskin.model.model import (
     DATA_KINDS,
     GAIN_DRIFT_KEPT,
-    REFERENCE_FOLLOWS,
+    TRACKS_REFERENCE,
     Defaults,
     Fields,
     Golden,
@@ -273,7 +273,7 @@ def _read_defaults(content: bytes, where: str) -> Defaults:
     )
     in_range = (
         1 <= d.iterations <= MAX_ITERATIONS
-        and d.touch_fit_left_out <= ALL_TOUCH_FIT | GAIN_DRIFT_KEPT | REFERENCE_FOLLOWS
+        and d.touch_fit_left_out <= ALL_TOUCH_FIT | GAIN_DRIFT_KEPT | TRACKS_REFERENCE
         and all(0 <= share <= 1 for share in shares)
         and all(0 <= size <= HUGE for size in sizes)
         and MIN_RADIUS_MM

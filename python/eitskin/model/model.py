@@ -19,7 +19,7 @@ from eitskin.skin.skin import Skin, skin_from_table
 
 DATA_KINDS = ("difference", "normalised", "log-ratio")
 GAIN_DRIFT_KEPT = 8  # a bit of touch_fit_left_out: changes along the reference are kept as data
-REFERENCE_FOLLOWS = 16  # another: between touches the reference tracks the untouched skin
+TRACKS_REFERENCE = 16  # another: between touches the reference tracks the untouched skin
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Defaults:
     Lambdas, the detection threshold and the other thresholds are factors without unit.
     ``mask_threshold`` is t of the mask x > t max(x). ``solver`` is one of ``core.results.SOLVERS``.
     ``touch_fit_left_out`` holds the bits of ``Options.touch_fit`` that are not set, and
-    ``GAIN_DRIFT_KEPT`` and ``REFERENCE_FOLLOWS``.
+    ``GAIN_DRIFT_KEPT`` and ``TRACKS_REFERENCE``.
     """
 
     iterations: int = 60

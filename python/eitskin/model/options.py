@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from eitskin.core.constants_table import (
-    FOLLOW_FRAMES,
+    REFERENCE_TRACKING_FRAMES,
     TRACK_CONFIRM,
     TRACK_DETECTION,
     TRACK_HOLD,
@@ -13,7 +13,7 @@ from eitskin.core.constants_table import (
 )
 from eitskin.core.options_table import ALL_TOUCH_FIT, MAX_TOUCHES, OF_MODEL
 from eitskin.core.results import Options
-from eitskin.model.model import GAIN_DRIFT_KEPT, REFERENCE_FOLLOWS, Model
+from eitskin.model.model import GAIN_DRIFT_KEPT, TRACKS_REFERENCE, Model
 
 
 def default_options(model: Model) -> Options:
@@ -25,7 +25,9 @@ def default_options(model: Model) -> Options:
         max_masked=model.protocol.n_rows // 2,
         touch_fit=ALL_TOUCH_FIT & ~d.touch_fit_left_out,
         project_reference=not d.touch_fit_left_out & GAIN_DRIFT_KEPT,
-        reference_frames=FOLLOW_FRAMES if d.touch_fit_left_out & REFERENCE_FOLLOWS else 0,
+        reference_frames=REFERENCE_TRACKING_FRAMES
+        if d.touch_fit_left_out & TRACKS_REFERENCE
+        else 0,
         touch_seek=bool(d.touch_fit_left_out & GAIN_DRIFT_KEPT),
     )
 

@@ -13,7 +13,7 @@ from eitskin.core.options_table import ALL_TOUCH_FIT
 from eitskin.fem.grid import Grid
 from eitskin.model.build import LIPSCHITZ_MARGIN
 from eitskin.model.eitm import encode_model
-from eitskin.model.model import GAIN_DRIFT_KEPT, REFERENCE_FOLLOWS, Defaults, Golden, Model
+from eitskin.model.model import GAIN_DRIFT_KEPT, TRACKS_REFERENCE, Defaults, Golden, Model
 from eitskin.model.reduction import noise_gain, spectral_norm_squared
 from eitskin.model.storage import store
 from eitskin.skin.protocol import Protocol, Reciprocity
@@ -39,7 +39,7 @@ def taught_defaults(grid: Grid, least_share: float) -> Defaults:
         touch_change_s_per_m=0.0,
         follow_mm=0.12 * grid.pixel_mm * max(grid.nx, grid.ny),
         solver="active-set",
-        touch_fit_left_out=ALL_TOUCH_FIT | GAIN_DRIFT_KEPT | REFERENCE_FOLLOWS,
+        touch_fit_left_out=ALL_TOUCH_FIT | GAIN_DRIFT_KEPT | TRACKS_REFERENCE,
     )
 
 

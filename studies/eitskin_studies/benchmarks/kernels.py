@@ -102,14 +102,14 @@ def run(
         configure = [
             "cmake",
             "-S",
-            str(root),
+            str(root / "studies" / "bench"),
             "-B",
             str(folder),
             "-G",
             "Ninja",
             "-DCMAKE_BUILD_TYPE=Release",
         ]
-        _run([*configure, "-DEITSKIN_TESTS=OFF", "-DEITSKIN_BENCH=ON"])
+        _run(configure)
         _run(
             [
                 "cmake",
@@ -118,9 +118,7 @@ def run(
                 *(word for width in WIDTHS for word in ("--target", f"bench_kernels_{width}")),
             ]
         )
-        programs = {
-            width: folder / "tests" / "bench" / f"bench_kernels_{width}" for width in WIDTHS
-        }
+        programs = {width: folder / f"bench_kernels_{width}" for width in WIDTHS}
         outputs = {
             width: _run([str(program), *map(str, (rank, columns, rounds))])
             for width, program in programs.items()

@@ -43,6 +43,9 @@ EXPERIMENTS = {
     "fast-path": (
         "touches after each drive, while they land, move and lift: false ones, delay, error"
     ),
+    "constants": (
+        "each constant of the core halved and doubled: which judging scenes change, and by how much"
+    ),
     "levers": (
         "what was tried to do better, each for itself: what helps for its MACs, and what does not"
     ),

@@ -17,7 +17,7 @@ from small_models import prebuilt, session
 SEED = 2024
 
 
-@pytest.fixture(scope="module", params=[60, 200])
+@pytest.fixture(scope="module", params=[60, pytest.param(200, marks=pytest.mark.long("60 scenes"))])
 def simulated(request) -> Simulated:
     """scripts/test has 60 scenes, scripts/test --all 200."""
     return session("acceptance", request.param, SEED)

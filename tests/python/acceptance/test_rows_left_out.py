@@ -29,7 +29,9 @@ from small_models import prebuilt
 
 SCENES = 160
 # scripts/test has the first 48, scripts/test --all all of them
-some_and_all = pytest.mark.parametrize("count", [48, SCENES])
+some_and_all = pytest.mark.parametrize(
+    "count", [48, pytest.param(SCENES, marks=pytest.mark.long("48 scenes"))]
+)
 # what an electrode costs differs from set to set: .024 here, .028 on the training set, .031 on a
 # third
 SEED = 78

@@ -13,7 +13,7 @@ HERE = Path(__file__).parent
 SCRIPT = HERE / "mutated_files.py"
 
 
-@pytest.mark.parametrize("count", [20, 1000])
+@pytest.mark.parametrize("count", [20, pytest.param(1000, marks=pytest.mark.long("20 files"))])
 def test_each_is_read_or_refused_soon(count):
     done = subprocess.run(
         [sys.executable, SCRIPT, str(count)], env={**os.environ, "PYTHONPATH": str(HERE.parent)},

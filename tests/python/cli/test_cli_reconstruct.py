@@ -239,6 +239,7 @@ def test_the_whole_way(done, told, tmp_path):
     assert load_frames(frames_path).n_frames == 12
 
 
+@pytest.mark.long("test_the_demo_goes_without_an_emulator, test_the_whole_way")
 def test_the_demo(tmp_path, ran):
     out, err = ran(0, f"demo --picture {tmp_path / 'demo.png'} --json")
     facts = json.loads(out)

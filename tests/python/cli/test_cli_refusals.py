@@ -255,7 +255,6 @@ def test_a_description_that_is_no_text(refused, tmp_path):
         ("model verify NONE", "no such model"),
         ("reconstruct NONE", "no such frames file; check the path"),
         ("reconstruct FRAMES --model NONE -o OUT", "no such model"),
-        ("compare --skin NONE", "no such skin description"),
         # a folder instead of a file
         ("model info FOLDER", "FOLDER"),
         ("model build FOLDER -o OUT", "FOLDER"),
@@ -283,8 +282,6 @@ def test_outputs_are_checked_before_the_work(place, refused, tmp_path, frames_fi
         ("demo", "--picture", output),
     ):
         assert text in refused(FILE, *arguments)
-    if place != ".":
-        assert text in refused(FILE, f"compare --csv {output}")
 
 
 def test_a_disk_that_is_full(refused, tmp_path, frames_file, monkeypatch):

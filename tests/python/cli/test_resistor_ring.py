@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from eitskin.cli.main import main
-from eitskin.frames.front_end import FrontEnd, demand_of, resistor_from, suitable
+from eitskin.frames.front_end import (
+    Demand,
+    FrontEnd,
+    advice,
+    demand_of,
+    resistor_from,
+    suitable,
+)
 from eitskin.frames.homogeneous import resistor_ring, voltages_of
 from eitskin.skin.protocol import Protocol, adjacent, opposite
 
@@ -70,7 +77,52 @@ def test_what_is_proposed_suits(conductivity):
 
 
 def test_resistors_are_of_the_series():
-    assert [resistor_from(ohm) for ohm in (1000.0, 1001.0, 8300.0)] == [1000.0, 1100.0, 9100.0]
+    wanted = {1.0: 1.0, 1.05: 1.1, 99.0: 100.0, 1000.0: 1000.0, 1001.0: 1100.0, 8300.0: 9100.0}
+    assert {ohm: resistor_from(ohm) for ohm in wanted} == wanted
+    assert resistor_from(47e3) == 47e3
+
+
+ADVICE = {
+    "it suits": (
+        Demand(row_ohm=500.0, drive_ohm=2000.0),
+        ["0.5 mA, gain 3: source 1 of 12 V, converter 0.75 of 1.65 V: suits"],
+    ),
+    "too much for source and converter": (
+        Demand(row_ohm=10_000.0, drive_ohm=200_000.0),
+        [
+            "0.5 mA, gain 3: source 100 of 12 V, converter 15 of 1.65 V: unsuited",
+            # 12 V / 200 kohm = 0.06 mA, so 1 V / 18 kohm; 1.2375 V / (0.0556 mA 10 kohm) = 2.23
+            "0.0556 mA, gain 2.23: source 11.1 of 12 V, converter 1.24 of 1.65 V",
+            "source resistor 18,000 ohm, R_G 8,065 ohm; FRONT_END_GAIN_PPM 123750,"
+            " SOURCE_UA_RMS 39 in the board's file",
+        ],
+    ),
+    "less than the receiver's gain of 1": (
+        Demand(row_ohm=60_000.0, drive_ohm=200_000.0),
+        [
+            "0.5 mA, gain 3: source 100 of 12 V, converter 90 of 1.65 V: unsuited",
+            "0.0196 mA, gain 1: source 3.92 of 12 V, converter 1.18 of 1.65 V",
+            "source resistor 51,000 ohm, no R_G; FRONT_END_GAIN_PPM 19608,"
+            " SOURCE_UA_RMS 14 in the board's file",
+        ],
+    ),
+    "hardly anything at the greatest current and gain": (
+        Demand(row_ohm=0.1, drive_ohm=250.0),
+        [
+            "0.5 mA, gain 3: source 0.125 of 12 V, converter 0.00015 of 1.65 V: unsuited",
+            "6.67 mA, gain 100: source 1.67 of 12 V, converter 0.0667 of 1.65 V",
+            "source resistor 150 ohm, R_G 100 ohm; FRONT_END_GAIN_PPM 666666667,"
+            " SOURCE_UA_RMS 4714 in the board's file",
+            "even so the converter is hardly used or clips: change the skin's conductivity or"
+            " thickness, or the protocol",
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize(("demand", "lines"), ADVICE.values(), ids=ADVICE)
+def test_the_advice_names_the_resistors(demand, lines):
+    assert [line[17:] for line in advice(demand)] == lines
 
 
 def test_a_resistance_below_zero_is_a_mistake(refused):

@@ -40,18 +40,14 @@ def run(*command: str | Path) -> str:
 
 
 def build_core() -> Path:
-    """``build/static``: the static libraries of both widths in ``built``, to be installed
-    into ``installed``; one build for all tests, whichever process asks first."""
-    compiler, cmake, folder = tool("cc", "gcc", "clang"), tool("cmake"), ROOT / "build" / "static"
-    generator = (
-        ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={tool('ninja')}"] if not shutil.which("make") else []
-    )
-    settings = [f"-DCMAKE_C_COMPILER={compiler}", "-DEITSKIN_TESTS=OFF", "-DEITSKIN_PYTHON=OFF"]
-    places = [f"-DCMAKE_INSTALL_PREFIX={folder / 'installed'}", "-DCMAKE_INSTALL_LIBDIR=lib"]
+    """``build/host`` with the static libraries of both widths brought up to date: the build of the
+    C tests, one for all processes."""
+    folder = ROOT / "build" / "host"
+    cmake, ninja = tool("cmake"), tool("ninja")
+    tool("cc", "gcc", "clang")
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        run(cmake, "-S", ROOT, "-B", folder / "built", *generator, *settings, *places)
-        targets = ["--target", "eitskin_f32", "eitskin_f64"]
-        run(cmake, "--build", folder / "built", "--parallel", "2", *targets)
+        run(cmake, "-S", ROOT, "--preset", "host", f"-DCMAKE_MAKE_PROGRAM={ninja}")
+        run(cmake, "--build", folder, "--target", "eitskin_f32", "eitskin_f64")
     return folder

@@ -126,7 +126,7 @@ def test_other_arithmetic_in_one_file_is_found_by_the_set_and_not_by_the_one_ima
     flags = ["-ffp-contract=fast", "-mfma"] if fused else ["-ffp-contract=off", "-include"]
     flags += [] if fused else [str(tmp_path / "unfused.h")]
     compiler, include = tool("cc", "gcc"), [f"-I{CSRC / 'src'}", f"-I{CSRC / 'include'}"]
-    planted, library = tmp_path / "planted.o", build_core() / "built" / "libeitskin_f32.a"
+    planted, library = tmp_path / "planted.o", build_core() / "libeitskin_f32.a"
     run(compiler, "-O3", "-std=gnu11", *flags, *include, "-c", CSRC / "src" / source, "-o", planted)
     # before the library, so that the linker leaves the library's own out
     files = [tmp_path / "main.c", planted, library, "-lm", "-o", tmp_path / "program"]

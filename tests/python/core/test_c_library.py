@@ -34,7 +34,7 @@ class Symbol:
 @pytest.fixture(scope="module")
 def libraries() -> dict[str, Path]:
     """Both widths."""
-    folder = build_core() / "built"
+    folder = build_core()
     return {width: folder / f"libeitskin_{width}.a" for width in WIDTHS}
 
 

@@ -19,7 +19,7 @@ from eitskin.model.options import default_options
 from small_models import prebuilt
 
 WIDTHS = ("float32", "float64")
-CONSTANTS = load_toml(ROOT / "tables" / "constants.toml", "table")["room"]
+CONSTANTS = load_toml(ROOT / "tables" / "constants.toml", "table")["module"]
 
 
 def test_what_is_written_from_the_tables_is_up_to_date():
@@ -28,19 +28,19 @@ def test_what_is_written_from_the_tables_is_up_to_date():
     assert done.returncode == 0, f"run  python tables/make_tables.py\n{done.stdout}{done.stderr}"
 
 
-@pytest.mark.parametrize("room", CONSTANTS, ids=[room["name"] for room in CONSTANTS])
-def test_a_constant_is_used_where_its_room_has_it(room):
-    header = ROOT / room.get("header", f"csrc/src/{room['name']}/constants.h")
+@pytest.mark.parametrize("module", CONSTANTS, ids=[module["name"] for module in CONSTANTS])
+def test_a_constant_is_used_in_its_module(module):
+    header = ROOT / module.get("header", f"csrc/src/{module['name']}/constants.h")
     others = [path for path in header.parent.glob("*.[ch]") if path != header]
     text = "\n".join(path.read_text(encoding="ascii") for path in others)
-    for name, *_, last in (row for group in room["group"] for row in group["rows"]):
+    for name, *_, last in (row for group in module["group"] for row in group["rows"]):
         written_out = last in ("left * left * left", "ratio sqrt(sqrt(ratio))")
-        macro = f"{room.get('prefix', 'EITS_')}{name}"
+        macro = f"{module.get('prefix', 'EITS_')}{name}"
         assert re.search(rf"\b{macro}\b", text) or written_out, name
 
 
 def test_constants_have_one_name_and_a_check_that_exists():
-    groups = [group for room in CONSTANTS for group in room["group"]]
+    groups = [group for module in CONSTANTS for group in module["group"]]
     names = [row[0] for group in groups for row in group["rows"]]
     assert len(set(names)) == len(names) > 100
     tests = [f"{path.stem[5:]}_f32" for path in (ROOT / "tests" / "c").glob("test_*.c")]

@@ -17,12 +17,11 @@ EXAMPLES = ROOT / "examples" / "c"
 
 
 @pytest.fixture(scope="module")
-def prefix() -> Path:
+def prefix(tmp_path_factory) -> Path:
     """Where the core is installed."""
-    folder = build_core()
-    shutil.rmtree(folder / "installed", ignore_errors=True)
-    run("cmake", "--install", folder / "built", "--component", "core")
-    return folder / "installed"
+    folder = tmp_path_factory.mktemp("installed")
+    run("cmake", "--install", build_core(), "--component", "core", "--prefix", folder)
+    return folder
 
 
 @pytest.fixture(scope="module")

@@ -108,7 +108,14 @@ with sim_device() as device:
 """
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed",
+    [
+        0,
+        pytest.param(1, marks=pytest.mark.long("seed 0")),
+        pytest.param(2, marks=pytest.mark.long("seed 0")),
+    ],
+)
 def test_a_killed_recorder_loses_at_most_the_last_packet(seed, tmp_path):
     path, here = tmp_path / "killed.eits", Path(__file__).resolve().parent
     script = KILLED.format(paths=[str(here), str(here.parent)])

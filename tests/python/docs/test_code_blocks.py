@@ -10,20 +10,25 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
+# pages that a short run leaves out, and what stands for them there
+CLI = pytest.mark.long("tests/python/cli runs these commands one by one")
+SCENES = pytest.mark.long("tests/python/scene")
+TEACHING = pytest.mark.long("teaching/test_guide.py, test_a_whole_session, and test_update.py")
+API = pytest.mark.long("the README's Python, package/test_public.py, the tests of each module")
 PAGES = (
     "README.md",
-    "docs/guide/tutorial.md",
+    pytest.param("docs/guide/tutorial.md", marks=CLI),
     "docs/guide/import-and-doctor.md",
-    "docs/guide/scenes.md",
-    "docs/guide/shapes.md",
-    "docs/guide/build-a-skin.md",
-    "docs/guide/teaching.md",
-    "docs/guide/calibration.md",
-    "docs/guide/board.md",
-    "docs/guide/gestures.md",
+    pytest.param("docs/guide/scenes.md", marks=SCENES),
+    pytest.param("docs/guide/shapes.md", marks=CLI),
+    pytest.param("docs/guide/build-a-skin.md", marks=CLI),
+    pytest.param("docs/guide/teaching.md", marks=TEACHING),
+    pytest.param("docs/guide/calibration.md", marks=CLI),
+    pytest.param("docs/guide/board.md", marks=CLI),
+    pytest.param("docs/guide/gestures.md", marks=CLI),
     "docs/guide/touches-out.md",
-    "docs/guide/your-board.md",
-    "docs/reference/python-api.md",
+    pytest.param("docs/guide/your-board.md", marks=CLI),
+    pytest.param("docs/reference/python-api.md", marks=API),
     "docs/reference/frames-format.md",
 )
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -38,6 +38,7 @@ def built(processor: str, folder: Path) -> Path:
     return folder / "tests" / "emulated" / "frames_m7"
 
 
+@pytest.mark.long("the same bits on the Cortex-M7")
 @pytest.mark.parametrize("processor", COMPILERS)
 def test_the_same_bits_as_the_host(processor, tmp_path):
     """Ten frames of up to three touches by three solvers, cold and warm, tracked, with an electrode

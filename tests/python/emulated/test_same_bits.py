@@ -31,6 +31,8 @@ from simulated_presses import SKIN, presses
 from small_models import session as simulated_session
 from small_models import small, small_blob, small_model
 
+AS_F32 = pytest.mark.long("the same with f32 and i8")
+
 
 @pytest.fixture(scope="session")
 def program(cortex_m7) -> Path:
@@ -208,7 +210,10 @@ def test_every_storage_costs_little_more_than_f32(program, tmp_path):
         assert mean[storage] <= MAX_TIMES_F32[storage] * mean["f32"]
 
 
-@pytest.mark.parametrize("storage", STORAGES)
+@pytest.mark.parametrize(
+    "storage",
+    ["f32", pytest.param("f16", marks=AS_F32), pytest.param("i16", marks=AS_F32), "i8"],
+)
 def test_plain_c_gives_the_same_for_more_instructions(program, tmp_path, storage):
     model, _ = load_prebuilt()
     quiet, frames = session(model, 8, 1)

@@ -61,6 +61,7 @@ def amplitude_errors_lsb(device: Device) -> np.ndarray:
     return np.concatenate([frame.voltage_v - exact for frame in frames]) / STEP_V
 
 
+@pytest.mark.long("firmware/test_qemu_board.py")
 def test_the_same_session_gives_the_same_bytes(image):
     runs = []
     for _ in range(2):
@@ -119,7 +120,10 @@ def periods_us(device: Device, frames: int) -> tuple[float, float]:
     return float(np.diff(raw)[2:].mean()), float(np.diff(solved)[2:].mean())
 
 
-@pytest.mark.parametrize(("check_every", "rows"), [(1, 208), (0, 104)])
+@pytest.mark.parametrize(
+    ("check_every", "rows"),
+    [pytest.param(1, 208, marks=pytest.mark.long("half the rows")), (0, 104)],
+)
 def test_frame_rates(image, check_every, rows):
     """208 and 104 measurements of 80 samples, the solve overlapped: the slower of scan and solve is
     what bounds the rate."""
@@ -156,6 +160,7 @@ def test_another_frequency(image):
     clean(board)
 
 
+@pytest.mark.long("test_timers.py without the 8 MHz")
 def test_without_the_8_mhz_the_red_light_blinks(image):
     board = EmulatedBoard(image, power_up(image, noisy=False).skin, hse_hz=None)
     lights = set()

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from eitskin.core.diagnostics import names
 from eitskin.device.bank import bank_bytes
@@ -37,6 +38,7 @@ def taken(device: Device, frames: int) -> tuple[list[Frame], list[Fault]]:
     ]
 
 
+@pytest.mark.long("the other diagnostic of this file")
 def test_an_electrode_that_comes_off_in_mid_stream(image):
     """Named by a fault and by the head in the same frame, at the latest the first that is wholly
     without it; gone after eight frames with it; every bit, and all that was found, as the host

@@ -2,6 +2,7 @@
 hangs, noise on the line."""
 
 import numpy as np
+import pytest
 
 from eitskin.device.client import Device
 from eitskin.device.wire import link_table as commands
@@ -74,6 +75,7 @@ def test_noise_on_the_line_is_counted_and_nothing_else(image):
     clean(board)
 
 
+@pytest.mark.long("test_noise_on_the_line_is_counted_and_nothing_else")
 def test_a_slow_line_drops_whole_packets_and_counts_them(image):
     """Images and raw frames of every frame are more than 1 Mbaud carries at 48 frames a second."""
     board = power_up(image)

@@ -14,6 +14,10 @@ from eitskin.config import load_toml
 from emulated import IMAGE
 from small_models import small_blob
 
+pytestmark = pytest.mark.long(
+    "studies/mutate has mutants of the firmware; test_emulated_board.py checks the image"
+)
+
 COPIED = (
     "csrc", "firmware", "cmake", "tests/emulated", "tests/soak", "CMakeLists.txt",
     "CMakePresets.json",

@@ -57,7 +57,9 @@ def half_erased(rng: np.random.Generator) -> list[bytes]:
     return [first + bank[LARGE:], b"\xff" * LARGE + bank[LARGE:], b"\xff" * LARGE + last]
 
 
-@pytest.mark.parametrize("cuts", ["sample", "every word"])
+@pytest.mark.parametrize(
+    "cuts", ["sample", pytest.param("every word", marks=pytest.mark.long("a sample of the words"))]
+)
 def test_a_model_is_open_after_every_cut(image, cuts):
     rng = np.random.default_rng(5)
     states = spare_at_each_write(image)

@@ -170,6 +170,7 @@ void program(void) {
 """
 
 
+@pytest.mark.long("test_the_more_urgent_interrupt_preempts")
 def test_an_interrupt_at_any_place_changes_nothing():
     undisturbed = out(run_program(SPOILING % (0, 100, 0), 400_000), 14)
     assert undisturbed[1:3] == [0, 1]

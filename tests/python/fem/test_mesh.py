@@ -135,7 +135,9 @@ def test_sizes_are_obeyed_and_repeatable():
     ],
     ids=lambda skin: skin.name,
 )
-@pytest.mark.parametrize("elements", [1000, 3000, 10500])
+@pytest.mark.parametrize(
+    "elements", [1000, pytest.param(3000, marks=pytest.mark.long("1,000 and 10,500")), 10500]
+)
 def test_element_counts_in_one_go(skin, elements, monkeypatch):
     calls = Mock(side_effect=build_mesh)
     monkeypatch.setattr(mesh_module, "build_mesh", calls)

@@ -99,6 +99,7 @@ def test_sizes(elf, sections, symbols):
     assert f"0x{symbols['stack_top']:08x}" in elf.with_suffix(".map").read_text(encoding="utf-8")
 
 
+@pytest.mark.long("test_prebuilt.py builds the image once")
 def test_the_same_bytes_wherever_it_is_built(elf, tmp_path):
     """In a copy of the checkout with another path, in a folder of another name."""
     copy = tmp_path / "a checkout elsewhere"

@@ -70,7 +70,14 @@ def rms(frames: Frames) -> float:
     return float(np.sqrt(np.mean(frames.reference_voltage_v**2)))
 
 
-@by_protocol
+@pytest.mark.parametrize(
+    "protocol",
+    [
+        p if name == "adjacent" else pytest.param(p, marks=pytest.mark.long("adjacent"))
+        for name, p in PROTOCOLS.items()
+    ],
+    ids=PROTOCOLS,
+)
 def test_fifty_healthy_frames_raise_no_alarm(protocol):
     skin = skin_for(protocol)
     for seed in range(50):
@@ -189,7 +196,11 @@ def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame():
         assert only(turned, "numbering", skin=skin).repair == option
 
 
-@pytest.mark.parametrize("firsts", [(0, 5), range(16)], ids=["two", "all"])
+@pytest.mark.parametrize(
+    "firsts",
+    [(0, 5), pytest.param(range(16), marks=pytest.mark.long("two of the wires"))],
+    ids=["two", "all"],
+)
 def test_every_pair_of_exchanged_wires_is_named(firsts):
     for i, j in combinations(range(16), 2):
         if i not in firsts:
@@ -198,7 +209,14 @@ def test_every_pair_of_exchanged_wires_is_named(firsts):
         assert only(exchanged, "swapped-electrodes").repair == f"--swap {i},{j}"
 
 
-@pytest.mark.parametrize(("width_mm", "known"), [(4.0, True), (20.0, True), (1.5, False)])
+@pytest.mark.parametrize(
+    ("width_mm", "known"),
+    [
+        (4.0, True),
+        pytest.param(20.0, True, marks=pytest.mark.long("4 mm")),
+        pytest.param(1.5, False, marks=pytest.mark.long("4 mm")),
+    ],
+)
 def test_joined_electrodes_are_named_whatever_their_width(width_mm, known):
     skin = replace(PAPER, electrodes=replace(PAPER.electrodes, width_mm=width_mm))
     transfer = homogeneous(skin, 16).transfer_ohm
@@ -210,7 +228,14 @@ def test_joined_electrodes_are_named_whatever_their_width(width_mm, known):
         assert finding.evidence["electrodes"] == [i, j] and finding.repair == ""
 
 
-@pytest.mark.parametrize(("driving", "measuring"), [(True, True), (True, False), (False, True)])
+@pytest.mark.parametrize(
+    ("driving", "measuring"),
+    [
+        (True, True),
+        pytest.param(True, False, marks=pytest.mark.long("both sides")),
+        pytest.param(False, True, marks=pytest.mark.long("both sides")),
+    ],
+)
 def test_every_dead_electrode_is_named_with_its_side(driving, measuring):
     for electrode in range(16):
         rng = np.random.default_rng(electrode)
@@ -351,6 +376,43 @@ def test_one_quiet_frame_leaves_noise_untold():
     report = report_of(healthy_frames(22, quiet=1))
     assert named(report) == [] and "snr_db" not in report.measured
     assert any(text.startswith("noise, SNR and drift: 1 quiet frame(s)") for text in report.untold)
+
+
+def stuck(frames: Frames, channels: list[int]) -> Frames:
+    """Channels that give one value in every untouched frame and in the others."""
+    reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
+    reference[:, channels] = voltage[:, channels] = 1e-4
+    return changed(frames, reference, voltage)
+
+
+def not_finite(frames: Frames, channels: list[int]) -> Frames:
+    """NaN in the first untouched frame."""
+    reference = frames.reference_voltage_v.copy()
+    reference[0, channels] = np.nan
+    return changed(frames, reference, frames.voltage_v)
+
+
+SEVERAL = {
+    "two pairs of exchanged wires": (
+        lambda: wired(8, (3, 9), (1, 14)), "swapped-electrodes", "--swap 3,9 --swap 1,14",
+    ),
+    "two channels of the wrong sign": (
+        lambda: channels_off(healthy_frames(12), [17, 90], -1.0),
+        "flipped-channels", "--flip-channels 17,90",
+    ),
+    "two stuck channels": (
+        lambda: stuck(healthy_frames(22), [4, 60]), "stuck", "--impute-channels 4,60",
+    ),
+    "three channels with numbers that are not finite": (
+        lambda: not_finite(healthy_frames(20), [3, 4, 8]),
+        "not-finite", "--impute-channels 3,4,8",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("made", "name", "repair"), SEVERAL.values(), ids=SEVERAL)
+def test_several_faults_of_a_kind_are_one_finding(made, name, repair):
+    assert only(made(), name).repair == repair
 
 
 def test_several_remedies_become_one():

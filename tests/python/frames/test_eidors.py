@@ -201,6 +201,7 @@ def test_what_is_no_skin_is_refused(spoil, said, tmp_path):
     assert said in str(refused.value) and "\n" not in str(refused.value)
 
 
+@pytest.mark.long("the other tests of the file, by scipy; Octave takes a minute to install")
 def test_octave_solves_what_we_export_and_we_import_what_it_saves(exported, tmp_path):
     octave, theirs = shutil.which("octave-cli"), tmp_path / "theirs.mat"
     assert octave, "octave-cli is not installed: apt-get install octave"

@@ -11,6 +11,7 @@ from eitskin.frames.homogeneous import (
     disk_transfer,
     homogeneous,
     shorted,
+    shorted_frames,
     touch_transfer,
     voltages_of,
 )
@@ -78,6 +79,12 @@ def test_joined_electrodes_have_one_potential():
     transfer = shorted(homogeneous(None, 16).transfer_ohm, 3, 9)
     between = np.array([[0, 1, 3, 9], [5, 12, 3, 9], [3, 9, 0, 1]])
     assert np.allclose(voltages_of(transfer, between), 0, atol=1e-12)
+
+
+def test_frames_of_several_joined_pairs_are_those_of_each():
+    transfer, pairs = homogeneous(None, 16).transfer_ohm, np.array([[3, 9], [0, 1]])
+    each = [voltages_of(shorted(transfer, i, j), ROWS) for i, j in pairs]
+    assert np.allclose(shorted_frames(transfer, pairs, ROWS), each, atol=1e-12)
 
 
 def test_other_outlines_use_finite_elements_and_scale_with_the_sheet():

@@ -65,14 +65,18 @@ def test_column_choices():
     assert chosen("0,2:4", 4, names, "--columns") == (0, 2, 3)
     assert chosen("1:", 4, names, "--columns") == (1, 2, 3)
     assert chosen("b,time", 4, names, "--columns") == (2, 0)
+    assert chosen(":", 4, names, "--columns") == (0, 1, 2, 3)
+    assert chosen("1,1", 4, names, "--columns") == (1, 1)
     for bad in ("4", "2:9", "3:1", "-1"):
         with pytest.raises(UsageError, match="out of range; there are 0 to 3"):
             chosen(bad, 4, names, "--columns")
-    with pytest.raises(
-        UsageError,
-        match="'d' is not a number, range a:b or a:b:step, or header name; names are time, a, b, c",
-    ):
-        chosen("d", 4, names, "--columns")
+    for unknown in ("d", "a-c", "2-4", ""):
+        with pytest.raises(
+            UsageError,
+            match=f"'{unknown}' is not a number, range a:b or a:b:step, or header name;"
+            " names are time, a, b, c",
+        ):
+            chosen(unknown, 4, names, "--columns")
 
 
 @pytest.mark.parametrize(

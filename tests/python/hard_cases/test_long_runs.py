@@ -20,7 +20,10 @@ COUNTS = (100, 1_000, 10_000, 100_000)
 HELD, FEW = 3_000, 100
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    "solver",
+    [s if s == "fista" else pytest.param(s, marks=pytest.mark.long("FISTA")) for s in SOLVERS],
+)
 def test_a_hundred_thousand_iterations(same_everywhere, margins, solver):
     """Rounding does not gather: what is lost between 100 iterations and 100,000 is never more than
     the rounding of one objective each."""

@@ -150,6 +150,13 @@ def test_the_prebuilt_model_is_what_the_builder_makes():
             assert b == pytest.approx(a, rel=1e-4)
 
 
+def test_the_usual_rank_is_that_of_the_folded_rows_to_64():
+    s = small("l", "adjacent", 8)
+    assert s.protocol.n_rows == 40
+    assert make_model(s.skin, s.protocol, s.linear, BuildSettings()).rank == 20
+    assert prebuilt()[0].rank == 64
+
+
 @pytest.mark.parametrize(
     ("changes", "text"),
     [

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eitm_bytes import HEADER_SIZE, entry_place, sealed, sections_of
+from eitm_bytes import HEADER_SIZE, entry_place, patched, sealed, sections_of
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import EitskinError, FileError, FrameError, ModelError
 from eitskin.model import eitm_sections
@@ -239,6 +239,33 @@ def meta(content: bytes) -> bytes:
     return sealed(bytes(whole), total=len(whole))
 
 
+# where in a section which number is wrong, and what is said of it
+WRONG = {
+    "DIMS": (0, "<I", 0, "holds a dimension out of range; build the model again"),
+    "PROT": (0, "<4B", (0, 0, 0, 0), "protocol: row 0 (from 0) is [0, 0, 0, 0]: a pair needs two"
+             " different electrodes; build the model again"),
+    "FOLD": (4, "<h", 2, "holds a fold of rows that do not exist, or a sign that is not 1 or -1"),
+    "GRID": (0, "<H", 0xFFFF, "holds a pixel outside the image; build the model again"),
+    "DEFS": (0, "<I", 0, "holds a default out of range; build the model again"),
+    "WHIT": (0, "<f", -1.0, "holds a section 'WHIT' that does not fit section 'REDU'"),
+    "FLDS": (0, "<f", float("inf"), "holds a number in section 'FLDS' that is out of range"),
+}  # fmt: skip
+
+
+def wrong(tag: str) -> bytes:
+    """The tiny model with one wrong number in section ``tag``."""
+    at, layout, value, _ = WRONG[tag]
+    values = value if isinstance(value, tuple) else (value,)
+    blob = tiny_blob()
+    return patched(blob, sections_of(blob)[tag].offset + at, layout, *values, rehash=tag == "PROT")
+
+
+def resized(tag: str) -> bytes:
+    """The tiny model with section ``tag`` four bytes shorter."""
+    blob = tiny_blob()
+    return patched(blob, entry_place(blob, tag) + 8, "<I", sections_of(blob)[tag].size - 4)
+
+
 FOREIGN = (b"", b"E", b"PK\x03\x04" + bytes(200), b"[skin]\nname = 'x'\n" * 20)
 NO_OBJECT = (
     b"", b"{", b"[]", b"3", b'"x"', b"\xff\xfe", b'{"skin": 3}', b'{"skin": {"skin": []}}',
@@ -253,6 +280,11 @@ REFUSED = {
     "twice": (lambda: with_extra_section(b"COLW", 1), "'COLW' is misplaced or repeated"),
     **{f"no {name}": (lambda name=name: without(name), f"section {name!r} is missing")
        for name in eitm_sections.REQUIRED},
+    **{f"{tag} with one wrong number": (lambda tag=tag: wrong(tag), said)
+       for tag, (_, _, _, said) in WRONG.items()},
+    **{f"{tag} of another size": (lambda tag=tag: resized(tag), f"holds section {tag!r} of ")
+       for tag in ("DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD",
+                   "WHIT", "FLDS")},
     "integers without scales": (lambda: without("SCAL", "i8"), "section 'SCAL' of no bytes"),
     "floats with scales": (lambda: with_extra_section(b"SCAL", 1), "section 'SCAL' of 5 bytes"),
     **{f"META {content[:12]!r}": (lambda content=content: meta(content), "'META'")

@@ -60,6 +60,33 @@ def test_touches_carry_the_load_of_strength_and_place(engine):
     assert seen >= 6
 
 
+def test_forces_are_interpolated_and_go_on_by_the_last_slope_to_twice_the_table():
+    """The table ends at a strength of 4 and 2.6 N, with a slope of 1.4 N / 1.5."""
+    strengths = {0.0: 0.0, 0.5: 0.2, 1.0: 0.4, -1.0: 0.4, 2.0: 0.4 + 0.8 / 1.5, 5.5: 4.0, 90.0: 5.2}
+    middle = np.zeros((len(strengths), 2))
+    found = law(order=0).forces_at(middle, np.array(list(strengths)))
+    assert found == pytest.approx(list(strengths.values()), rel=1e-6)
+
+
+PLACES = {  # u, v: the gain of 1 + 0.05 u - 0.1 v + 0.2 u^2 + 0.03 u v + 0.15 v^2
+    "the middle": ((0.0, 0.0), 1.0),
+    "half to the right": ((0.5, 0.0), 1 + 0.025 + 0.05),
+    "up and right": ((0.5, 0.5), 1 + 0.025 - 0.05 + 0.05 + 0.0075 + 0.0375),
+    "beyond the reach of 0.9, as there": ((3.0, 0.0), 1 + 0.045 + 0.162),
+}
+
+
+@pytest.mark.parametrize(("place", "gain"), PLACES.values(), ids=PLACES)
+def test_the_gain_of_a_place_is_the_polynomial(place, gain):
+    assert law().gains_at(97.0 * np.array([place])) == pytest.approx([gain], rel=1e-6)
+
+
+@pytest.mark.parametrize(("constant", "gain"), [(9.0, 4.0), (0.1, 0.25), (-2.0, 0.25)])
+def test_gains_stay_within_a_quarter_and_four(constant, gain):
+    constant_law = replace(law(order=0), gain=np.float32([constant]))
+    assert constant_law.gains_at(np.zeros((1, 2))) == pytest.approx([gain])
+
+
 WHOLE = encode_load(law())
 
 

@@ -355,6 +355,7 @@ def test_without_the_token_it_only_looks_on(live, server):
     until(lambda: "eitskin view printed" in live.text("answer"))
 
 
+@pytest.mark.long("the other tests look at the same page for seconds")
 def test_frames_go_on_without_end_and_memory_does_not(live, server):
     """As many frames as in ten minutes at 50 a second, as fast as they come."""
     live.choose("speed", "max")

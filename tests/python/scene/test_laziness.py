@@ -30,7 +30,10 @@ def fresh(code: str, *arguments: str) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("effects", [{}, {"mains": {}, "gel_drying": {}}])
+@pytest.mark.parametrize(
+    "effects",
+    [{}, pytest.param({"mains": {}, "gel_drying": {}}, marks=pytest.mark.long("no effects"))],
+)
 def test_only_named_effects_are_imported(effects):
     own, every = json.loads(fresh(PROBE, json.dumps(effects)))
     assert own == sorted(effects)

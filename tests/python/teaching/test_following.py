@@ -107,6 +107,7 @@ def test_a_resting_hand_does_not_fade_while_the_sheet_dries(model):
     assert worst[TIME] < 0.05 < 0.2 < worst[0]
 
 
+@pytest.mark.long("test_a_resting_hand_does_not_fade_while_the_sheet_dries")
 def test_the_librarys_resting_hand_does_not_fade():
     """Ten minutes on a gel that dries, a frame each 16 s, on a skin taught by 12 simulated
     presses."""

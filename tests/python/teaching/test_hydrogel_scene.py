@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from eitskin.cli.main import main
 from eitskin.model.eitm import load_model
@@ -47,6 +48,7 @@ def by_physics(model: Model, judged: Presses, sign: str) -> tuple[np.ndarray, np
     return error, count
 
 
+@pytest.mark.long("scene/test_library.py runs the scene, test_teach.py teaches")
 def test_physics_fails_and_teaching_works(tmp_path):
     plan, text = plan_of_scene("hydrogel")
     assert len(plan) == TAUGHT and "start_angle_deg" in text

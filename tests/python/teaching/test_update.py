@@ -48,7 +48,7 @@ def test_the_file_knows_what_was_learned(taught, model):
     assert known.presses == 40
 
 
-@pytest.mark.parametrize("count", [5, 12])
+@pytest.mark.parametrize("count", [5, pytest.param(12, marks=pytest.mark.long("5 presses"))])
 def test_a_remounted_skin_is_found_again(model, count):
     """Turned by 130 degrees, shifted by 3.6 mm, a fifth drier."""
     judged = presses(40, seed=9, **REMOUNTED)
@@ -128,7 +128,13 @@ def test_mirrored_and_strange_presses_are_told(model):
     assert median_error(updated.model, judged) < 0.03 * RADIUS_MM < median_error(model, judged)
 
 
-@pytest.mark.parametrize(("by", "note"), [(2, "2 more came first"), (-1, "the first was missed")])
+@pytest.mark.parametrize(
+    ("by", "note"),
+    [
+        pytest.param(2, "2 more came first", marks=pytest.mark.long("the first was missed")),
+        (-1, "the first was missed"),
+    ],
+)
 def test_places_shifted_by_some_presses_are_put_right(model, by, note):
     updated = update(model, shifted(presses(12, seed=4, **REMOUNTED), by))
     assert updated.move.turn_deg % 360 == pytest.approx(130, abs=3)

@@ -76,7 +76,9 @@ def assert_whole(figure: Any) -> None:
 
 
 @pytest.mark.parametrize("name", SKINS)
-@pytest.mark.parametrize("count", (1, 2, 12))
+@pytest.mark.parametrize(
+    "count", (1, pytest.param(2, marks=pytest.mark.long("1 and 12 panels")), 12)
+)
 def test_every_text_is_whole(name, count):
     skin, given = SKINS[name], panels(SKINS[name], count)
     grid = grid_for(skin.outline)

@@ -29,7 +29,9 @@ def album(count: int) -> Album:
     return kept
 
 
-@pytest.mark.parametrize("count", [1, 2, 50])
+@pytest.mark.parametrize(
+    "count", [1, 2, pytest.param(50, marks=pytest.mark.long("streams of 1 and 2 frames"))]
+)
 def test_pictures(count, tmp_path):
     path = tmp_path / "picture.png"
     draw_stream(path, prebuilt()[0], album(count), title="a board")

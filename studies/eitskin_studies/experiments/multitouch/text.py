@@ -48,8 +48,8 @@ def closing(counted: CountedScenes, limited: Sequence[Limit]) -> str:
         f"- Most touches up to which at least {100 * GOOD:.0f} % of the scenes are exact at"
         f" {HEADLINE_DB:g} dB: {far}.\n"
         f"- Of {sum(one.scenes for one in limited)} frames with many touches"
-        f" {sum(one.core[default] for one in limited)} are exact; begun at the true places,"
-        f" {sum(one.told[default] for one in limited)}."
+        f" {sum(one.core[default] for one in limited)} are exact;"
+        f" {sum(one.told[default] for one in limited)} are if the fit starts from the true places."
     )
 
 

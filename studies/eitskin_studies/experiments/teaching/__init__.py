@@ -102,11 +102,11 @@ def run(workspace: Workspace) -> ExperimentOutcome:
 
 def _conditions(splits: int) -> str:
     return (
-        f"{splits} random splits of 500 presses (seeds 0 to {splits - 1}), the last {JUDGED} of"
-        " each judged, each against the untouched frame just before it; medians over splits. No"
-        " number of a method was chosen on judged presses, but the recipe as a whole on this set."
-        " Two presses are sums of two real ones; exact: two touches, each within"
-        f" {PAIR_MM:g} mm of its own."
+        f"{splits} random splits of 500 presses (seeds 0 to {splits - 1}); the last {JUDGED} of"
+        " each are scored, each against the untouched frame just before it; medians over splits."
+        " No number of a method was chosen on scored presses, but the method as a whole was"
+        " developed on this set. Two presses are sums of two real ones; exact: two touches, each"
+        f" within {PAIR_MM:g} mm of its own."
     )
 
 

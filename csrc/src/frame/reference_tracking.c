@@ -1,31 +1,32 @@
-/* The reference follows the skin: all of it while nothing touches it, its size alone under a hand.
+/* Reference tracking: the reference follows the skin. While nothing touches the skin, all of the
+ * reference follows; under a touch, only its size.
  *
- * A skin dries, warms and creeps, and an old reference shows that as touches. Between touches there
- * is nothing on it: so the reference may go after the frames then. What would be ruinous is to go
- * after a touch, which fades and leaves its negative behind. Hence, with N = reference_frames:
+ * A skin dries, warms and creeps, and an old reference shows that as touches. The reference may
+ * therefore move while nothing touches the skin. It must never move towards a touch: the touch
+ * would fade, and leave its negative behind. With N = reference_frames:
  *
- *   - N / 16 frames on end without any touch, reported, tentative or held, are averaged; where a
- *     touch comes or goes, all of them are let go, with as many more, in which it lands or a soft
- *     skin creeps back
- *   - the mean's difference to the reference must not look like a touch that is too light to be
- *     found: one column of S must not give nearly all of it. White noise and drift of a whole sheet
- *     spread over many
- *   - then the reference moves a sixteenth of the way (with N < 16: a frame at a time, 1 / N)
+ *   - N / 16 consecutive frames without any touch (reported, tentative or held) are averaged. When
+ * a touch comes or goes, these frames are dropped, and so are as many after it, in which the touch
+ *     lands or a soft skin creeps back.
+ *   - The mean's difference from the reference must not look like a touch too light to be detected:
+ *     no single column of S may explain nearly all of it. White noise, and drift of a whole sheet,
+ *     spread over many columns.
+ *   - Then the reference moves a sixteenth of the way (with N < 16: one frame at a time, by 1 / N).
  *
- * So what a touch below the threshold can move it by until it is found is a sixteenth of the
- * threshold. A touch that grows by less than about half the detection threshold in 2.4 N frames is
- * below the noise of each mean, and is followed like drift: nothing tells it from a skin that
- * dries at one place.
+ * A touch below the detection threshold can thus move the reference by at most a sixteenth of the
+ * threshold before it is detected. A touch that grows by less than about half the threshold in 2.4
+ * N frames is below the noise of each mean, and the reference follows it like drift: it cannot be
+ * told from a skin that dries in one place.
  *
- * Under touches the reference keeps its pattern, however long. Only how large it is follows, and
- * only where the same number of touches has been there for N / 4 frames: of each mean the part
- * along the reference that no touch gives, u'y / u'u with u the reduced reference less its parts
- * along the touches' columns, is held where the first mean had it. So an even sheet that dries
- * under a resting hand changes its force by little; what dries unevenly, nothing can tell from the
- * hand.
+ * Under touches the reference keeps its pattern, for however long. Only its size follows, and only
+ * after the same number of touches has been there for N / 4 frames. Of each mean this takes the
+ * part along the reference that no touch can explain, u'y / u'u, where u is the reduced reference
+ * without its parts along the touches' columns, and holds it where the first mean had it. So an
+ * even sheet that dries under a resting hand changes its force by little. Uneven drying cannot be
+ * told from the hand.
  *
- * A reference that has moved is fitted to the model again, as a tare is: gain and row gains follow,
- * the noise stays. */
+ * A reference that has moved is fitted to the model again, as a tare is: gain and row gains are
+ * found again, the noise stays. */
 #include "frame/reference.h"
 
 #include "base/vec.h"
@@ -38,34 +39,34 @@
 
 static uint32_t frames_apart(const eits_context *ctx)
 {
-    return ctx->options.reference_frames / EITS_FOLLOW_PARTS;
+    return ctx->options.reference_frames / EITS_REFERENCE_TRACKING_PARTS;
 }
 
-int eits_follows(const eits_context *ctx)
+int eits_tracks_reference(const eits_context *ctx)
 {
-    return ctx->options.reference_frames > 0 && ctx->reference.follow.seen > frames_apart(ctx);
+    return ctx->options.reference_frames > 0 && ctx->reference.tracking.seen > frames_apart(ctx);
 }
 
-void eits_follow_break(eits_context *ctx)
+void eits_reference_tracking_break(eits_context *ctx)
 {
-    eits_follow *f = &ctx->reference.follow;
+    eits_reference_tracking *f = &ctx->reference.tracking;
     f->frames = f->open = f->means = 0;
     f->rest = frames_apart(ctx);
 }
 
-void eits_follow_add(eits_context *ctx, const eits_real *frame)
+void eits_reference_tracking_add(eits_context *ctx, const eits_real *frame)
 {
     eits_reference *b = &ctx->reference;
     if (ctx->options.reference_frames == 0)
         return;
-    if (b->follow.open) /* nobody looked for touches in it */
-        eits_follow_break(ctx);
+    if (b->tracking.open) /* eits_find_touches was not called for the last frame */
+        eits_reference_tracking_break(ctx);
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const eits_real off = ctx->rows.unusable[i] ? R(NAN) : frame[i] - b->v0[i];
-        b->m2[i] = b->follow.frames > 0 ? b->m2[i] + off : off;
+        b->m2[i] = b->tracking.frames > 0 ? b->m2[i] + off : off;
     }
-    b->follow.open = 1;
-    b->follow.seen += b->follow.seen < UINT32_MAX;
+    b->tracking.open = 1;
+    b->tracking.seen += b->tracking.seen < UINT32_MAX;
 }
 
 /* out = the data of `frame`, reduced and whitened, not projected. */
@@ -93,7 +94,7 @@ static void add_column(const eits_context *ctx, const eits_scratch *scratch, uin
 
 /* ---- untouched ---- */
 
-/* How much of a frame's |y|^2 the one column of S gives that gives most, 0 to 1. */
+/* The fraction of a frame's |y|^2 that the best single column of S explains, 0 to 1. */
 static eits_real best_match(eits_context *ctx, const eits_scratch *scratch, const eits_real *frame,
                             uint64_t *macs)
 {
@@ -115,15 +116,16 @@ static eits_real best_match(eits_context *ctx, const eits_scratch *scratch, cons
             eits_dot(ctx->kernels, column, column, model->rank));
 }
 
-/* Towards the mean of `count` frames, in m2, unless that looks like a touch. */
+/* Move the reference towards the mean of `count` frames, in m2, unless the mean looks like a touch.
+ * Returns 1 if it moved. */
 static int move(eits_context *ctx, const eits_scratch *scratch, uint32_t count, uint64_t *macs)
 {
     eits_reference *b = &ctx->reference;
     const eits_real share = (eits_real)count / (eits_real)ctx->options.reference_frames,
                     weight = share < 1 ? share : 1;
-    if (!(b->follow.level > 0))
-        b->follow.level = ctx->info.lambda_max;
-    if (best_match(ctx, scratch, b->m2, macs) > EITS_FOLLOW_TOUCH)
+    if (!(b->tracking.level > 0))
+        b->tracking.level = ctx->info.lambda_max;
+    if (best_match(ctx, scratch, b->m2, macs) > EITS_REFERENCE_TRACKING_TOUCH)
         return 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
         b->v0[i] = eits_fma(weight, b->m2[i] - b->v0[i], b->v0[i]);
@@ -132,8 +134,9 @@ static int move(eits_context *ctx, const eits_scratch *scratch, uint32_t count, 
 
 /* ---- under touches ---- */
 
-/* out (stride numbers) = F times what S gives at a touch, linear between centres of pixels: steps
- * of the fit end on edges of pixels, where rounding would choose the nearest. */
+/* out (stride numbers) = F times S at a touch's place, interpolated between the centres of pixels.
+ * The nearest pixel alone would not do: steps of the fit end on edges of pixels, where rounding
+ * would choose between two. */
 static void read_place(const eits_context *ctx, const eits_scratch *scratch,
                        const eits_touch *touch, eits_real *out, uint64_t *macs)
 {
@@ -162,14 +165,15 @@ static uint32_t span_touches(const eits_context *ctx, const eits_scratch *scratc
     uint32_t known = 0;
     for (uint32_t k = 0; k < count && known < rank; ++k) {
         read_place(ctx, scratch, &touches[k], direction + known * EITS_STRIDE(rank), macs);
-        /* not another touch's, nor off the skin */
-        known += (uint32_t)eits_add_direction(ctx, direction, known, EITS_FOLLOW_LEFT, macs);
+        /* 0 for a touch off the skin, and for one whose column the others span already */
+        known +=
+            (uint32_t)eits_add_direction(ctx, direction, known, EITS_REFERENCE_TRACKING_LEFT, macs);
     }
     return known;
 }
 
-/* By how much the frame in m2 is larger than the reference, beside what its touches give; 0 where
- * they may give all of it. Overwrites m2. */
+/* By how much the frame in m2 is larger than the reference, apart from what its touches explain; 0
+ * if they may explain all of it. Overwrites m2. */
 static eits_real gain_beside(eits_context *ctx, const eits_scratch *scratch,
                              const eits_touch *touches, uint32_t count, uint64_t *macs)
 {
@@ -184,23 +188,24 @@ static eits_real gain_beside(eits_context *ctx, const eits_scratch *scratch,
     const uint32_t known = span_touches(ctx, scratch, touches, count, scratch->square, macs);
     *macs += eits_take_out(ctx, scratch->square, known, u);
     const eits_real left = eits_dot(ctx->kernels, u, u, rank);
-    return left > EITS_FOLLOW_LEFT * whole ? eits_dot(ctx->kernels, u, y, rank) / left : 0;
+    return left > EITS_REFERENCE_TRACKING_LEFT * whole ? eits_dot(ctx->kernels, u, y, rank) / left
+                                                       : 0;
 }
 
-/* The reference as much larger as the skin beside the touches has become. */
+/* Scale the reference by as much as the skin beside the touches has grown. Returns 1 if it did. */
 static int grow(eits_context *ctx, const eits_scratch *scratch, const eits_touch *touches,
                 uint32_t count, uint32_t frames, uint64_t *macs)
 {
     eits_reference *b = &ctx->reference;
-    eits_follow *f = &b->follow;
-    if (ctx->model->data_kind != EITS_DATA_DIFFERENCE) /* ratios know no size */
+    eits_reference_tracking *f = &b->tracking;
+    if (ctx->model->data_kind != EITS_DATA_DIFFERENCE) /* ratios are the same at any size */
         return 0;
     const eits_real gain = gain_beside(ctx, scratch, touches, count, macs);
     if (f->means++ == 0)
         f->gain = gain;
     const eits_real by = gain - f->gain;
     if ((uint64_t)4 * f->means * frames <= ctx->options.reference_frames || by == 0 ||
-        !(eits_fabs(by) < EITS_FOLLOW_GAIN))
+        !(eits_fabs(by) < EITS_REFERENCE_TRACKING_GAIN))
         return 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i)
         b->v0[i] = eits_fma(by, b->v0[i], b->v0[i]);
@@ -209,15 +214,16 @@ static int grow(eits_context *ctx, const eits_scratch *scratch, const eits_touch
 
 /* ---- one frame after the other ---- */
 
-int eits_follow_end(eits_context *ctx, const eits_scratch *scratch, const eits_touch *touches,
-                    uint32_t count, uint32_t followed, uint64_t *macs)
+int eits_reference_tracking_end(eits_context *ctx, const eits_scratch *scratch,
+                                const eits_touch *touches, uint32_t count, uint32_t followed,
+                                uint64_t *macs)
 {
     eits_reference *b = &ctx->reference;
-    eits_follow *f = &b->follow;
+    eits_reference_tracking *f = &b->tracking;
     if (!f->open)
         return 0;
     if (followed != f->touches)
-        eits_follow_break(ctx);
+        eits_reference_tracking_break(ctx);
     f->touches = followed;
     f->open = 0;
     if (f->rest > 0) {
@@ -228,7 +234,7 @@ int eits_follow_end(eits_context *ctx, const eits_scratch *scratch, const eits_t
     if (frames < frames_apart(ctx))
         return 0;
     f->frames = 0;
-    if (followed == EITS_FOLLOW_UNKNOWN)
+    if (followed == EITS_TOUCHES_UNKNOWN)
         return 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const eits_real off = b->m2[i] / (eits_real)frames;

@@ -1,17 +1,16 @@
-"""Small mistakes made from the syntax of a source: an operator for another, a constant off by one,
-a condition negated, a statement left out.
+"""Small mistakes made from the syntax of a C source: an operator for another, a constant off by
+one, a condition negated, a statement left out.
 
 A mutant is known by its file, its function and the text of its lines before and after, not by line
 numbers, so that a judgement of it (``survivors.toml``) holds while other lines change.
 """
 
-import ast
 import hashlib
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -88,10 +87,9 @@ def _mutant(file: str, source: str, change: Change) -> Mutant:
 
 
 def mutants_of(file: str) -> list[Mutant]:
-    """All mutants of a C or Python source below the project's root, in the order of its text."""
+    """All mutants of a C source below the project's root, in the order of its text."""
     source = (ROOT / file).read_text()
-    made = list(_python_changes(source) if file.endswith(".py") else _c_changes(source))
-    mutants = [_mutant(file, source, change) for change in sorted(made)]
+    mutants = [_mutant(file, source, change) for change in sorted(_c_changes(source))]
     return list({m.key: m for m in mutants if m.before != m.after}.values())
 
 
@@ -198,78 +196,3 @@ def _may_be_left_out(statement: Sequence[Token]) -> bool:
         return False  # a declaration of a pointer
     call = len(words) > 2 and statement[0].kind == "word" and words[1] == "("
     return call or any(word in ASSIGNED for word in words)
-
-
-def _python_changes(source: str) -> Iterator[Change]:
-    starts = [0]
-    for line in source.splitlines(keepends=True):
-        starts.append(starts[-1] + len(line))
-    lines = source.splitlines()
-
-    def offset(line: int, column: int) -> int:
-        return starts[line - 1] + len(lines[line - 1].encode()[:column].decode())
-
-    def visit(node: ast.AST, function: str) -> Iterator[Change]:
-        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
-            function = f"{function}.{node.name}".lstrip(".")
-        if not isinstance(node, ast.JoinedStr):  # whose parts have no place of their own
-            for name, value in ast.iter_fields(node):
-                if name in ("annotation", "returns", "decorator_list", "bases", "type_comment"):
-                    continue
-                for child in value if isinstance(value, list) else [value]:
-                    if isinstance(child, ast.AST):
-                        yield from visit(child, function)
-        if function and isinstance(node, (ast.expr, ast.stmt)):
-            start = offset(node.lineno, node.col_offset)
-            end = offset(node.end_lineno or 0, node.end_col_offset or 0)
-            for replacement in _instead(node):
-                yield function, start, end, replacement
-            if isinstance(node, (ast.If, ast.While)) and isinstance(node.test, ASKED):
-                start = offset(node.test.lineno, node.test.col_offset)
-                end = offset(node.test.end_lineno or 0, node.test.end_col_offset or 0)
-                yield function, start, end, f"not ({ast.unparse(node.test)})"
-
-    yield from visit(ast.parse(source), "")
-
-
-SWAPPED_IN_PYTHON: dict[type[ast.AST], type[ast.AST]] = {
-    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In,
-    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
-    ast.FloorDiv: ast.Mult, ast.Mod: ast.Mult, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd,
-    ast.LShift: ast.RShift, ast.RShift: ast.LShift, ast.And: ast.Or, ast.Or: ast.And,
-}  # fmt: skip
-ASKED = (ast.Name, ast.Attribute, ast.Call, ast.NamedExpr)
-
-
-def _instead(node: ast.expr | ast.stmt) -> Iterator[str]:
-    """Texts to stand where this expression or statement does."""
-    match node:
-        case ast.Compare(ops=[op]) if type(op) in SWAPPED_IN_PYTHON:
-            yield f"({ast.unparse(ast.Compare(node.left, [_swapped(op)], node.comparators))})"
-        case ast.BinOp(op=op) if type(op) in SWAPPED_IN_PYTHON:
-            yield f"({ast.unparse(ast.BinOp(node.left, _swapped(op), node.right))})"
-        case ast.BoolOp(op=op):
-            yield f"({ast.unparse(ast.BoolOp(_swapped(op), node.values))})"
-        case ast.Constant(value=bool(value)):
-            yield str(not value)
-        case ast.Constant(value=int(value)):
-            yield "0" if value == 1 else f"({value} + 1)"
-        case ast.Constant(value=float(value)):
-            yield f"({value!r} * 2 + 1)"
-        case ast.UnaryOp(op=ast.Not() | ast.USub()):
-            yield f"({ast.unparse(node.operand)})"
-        case ast.IfExp():
-            yield f"({ast.unparse(ast.IfExp(node.test, node.orelse, node.body))})"
-        case ast.Return(value=ast.expr()):
-            yield "return None"
-        case ast.Raise() | ast.AugAssign() | ast.Continue() | ast.Break():
-            yield "pass"
-        case ast.Expr(value=ast.Call()):
-            yield "pass"
-        case ast.Assign(targets=[ast.Attribute() | ast.Subscript()]):
-            yield "pass"
-
-
-def _swapped(op: ast.AST) -> Any:
-    return SWAPPED_IN_PYTHON[type(op)]()

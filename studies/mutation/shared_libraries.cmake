@@ -1,4 +1,4 @@
-# The libraries that tests/tools/mutate_c.py changes are shared ones here, all of their names visible:
+# The libraries that studies/mutation/mutate_c.py changes are shared ones here, all of their names visible:
 # a changed one takes the place of the sound one, and no test is linked again.
 set(CMAKE_C_COMPILE_OPTIONS_VISIBILITY "-DVISIBILITY=")
 macro(add_library name)

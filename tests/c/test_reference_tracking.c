@@ -62,8 +62,8 @@ static int pass(bench *b, int count, int untouched)
     int moved = 0;
     for (int k = 0; k < count; ++k) {
         CHECK_OK(eits_reconstruct(b->on.c.ctx, b->frame, SMALL_ROWS, NULL, NULL));
-        moved +=
-            eits_follow_end(b->on.c.ctx, &b->on.c.ctx->scratch, &touch, touches, touches, &macs);
+        moved += eits_reference_tracking_end(b->on.c.ctx, &b->on.c.ctx->scratch, &touch, touches,
+                                             touches, &macs);
     }
     CHECK((macs > 0 || moved == 0) && macs < 10000);
     return moved;
@@ -158,11 +158,11 @@ TEST(frames_are_averaged_before_they_are_compared)
     change_fold(&b, 1, as_much(&b, 1));
     CHECK_EQUAL(pass(&b, 1, 1), 1);
     CHECK_NEAR(gone(&b, ctx->model->fold[1].first), 0.03125, 3e4 * EPS);
-    const eits_real level = ctx->reference.follow.level;
+    const eits_real level = ctx->reference.tracking.level;
     CHECK(level > 0 && level == ctx->info.lambda_max);
     change_all(&b, 0.02);
     CHECK_EQUAL(pass(&b, APART, 1), 1);
-    CHECK(ctx->reference.follow.level == level && ctx->info.lambda_max > level);
+    CHECK(ctx->reference.tracking.level == level && ctx->info.lambda_max > level);
 }
 
 TEST(a_row_that_one_frame_lacks_stays)
@@ -227,8 +227,9 @@ TEST(where_touches_may_give_all_it_stays)
             uint64_t macs = 0;
             change_all(&b, 0.001 * frame);
             CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
-            CHECK_EQUAL(eits_follow_end(ctx, &ctx->scratch, touches, 2 * RANK, 2 * RANK, &macs),
-                        k == 1 && frame > 0);
+            CHECK_EQUAL(
+                eits_reference_tracking_end(ctx, &ctx->scratch, touches, 2 * RANK, 2 * RANK, &macs),
+                k == 1 && frame > 0);
         }
         CHECK_NEAR(ctx->reference.v0[9] / b.quiet[9], k == 0 ? 1 : 1.002, 100 * EPS);
         eits_forget(ctx);
@@ -249,7 +250,8 @@ TEST(on_the_edge_of_pixels_rounding_decides_nothing)
             uint64_t macs = 0;
             change_fold(&b, 0, 0.01 * frame);
             CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
-            CHECK_EQUAL(eits_follow_end(ctx, &ctx->scratch, &touch, 1, 1, &macs), frame);
+            CHECK_EQUAL(eits_reference_tracking_end(ctx, &ctx->scratch, &touch, 1, 1, &macs),
+                        frame);
         }
         goes[side] = (double)(ctx->reference.v0[9] / b.quiet[9]) - 1;
     }
@@ -300,7 +302,8 @@ TEST(a_frame_of_no_use_is_not_followed)
     uint64_t macs = 0;
     change_all(&b, 0.01);
     CHECK_OK(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL));
-    CHECK_EQUAL(eits_follow_end(ctx, &ctx->scratch, NULL, 0, EITS_FOLLOW_UNKNOWN, &macs), 0);
+    CHECK_EQUAL(
+        eits_reference_tracking_end(ctx, &ctx->scratch, NULL, 0, EITS_TOUCHES_UNKNOWN, &macs), 0);
     CHECK_EQUAL(pass(&b, 1, 1), 1);
 }
 
@@ -344,8 +347,8 @@ TEST(touches_that_explain_little_are_drift)
             ctx->options.diagnostics = cases[k].diagnostics;
             ctx->options.detection_factor = 1;
             ctx->reference.lambda_noise = ctx->info.lambda_noise = (eits_real)cases[k].noise;
-            ctx->reference.follow.level = (eits_real)cases[k].level;
-            ctx->reference.follow.seen = cases[k].seen;
+            ctx->reference.tracking.level = (eits_real)cases[k].level;
+            ctx->reference.tracking.seen = cases[k].seen;
             ctx->info.lambda_max = (eits_real)cases[k].lambda_max;
             ctx->info.unexplained = (eits_real)cases[k].unexplained;
             ctx->info.diagnostics = 0;

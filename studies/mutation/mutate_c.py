@@ -1,6 +1,6 @@
 """Mutants of the core and of the firmware's application and drivers, tried by the C tests.
 
-The tests are built once (preset host): what is changed lies in shared libraries, and of a
+The tests are built once (preset mutation): what is changed lies in shared libraries, and of a
 mutant one object and its library are made, in a folder that the loader searches first. That one
 object is under the address and undefined-behaviour sanitizers, so that an index beyond an array is
 noticed where the numbers happen to stay right. A test may take so much of the processor's time, not
@@ -23,7 +23,7 @@ from subprocess import DEVNULL
 
 from mutants import ROOT, Mutant
 
-BUILD = ROOT / "build" / "host"
+BUILD = ROOT / "build" / "mutation"
 TESTS = {"eitskin_f32": "tests/c", "eitskin_f64": "tests/c", "fw_app": "tests/firmware"}
 FUZZ = ROOT / "tests" / "fuzz"
 CORPORA = {  # what came of the fuzzer's kept inputs is a test, too
@@ -79,14 +79,14 @@ def _after(command: Sequence[str], flag: str) -> str:
 
 def read_libraries() -> dict[str, Library]:
     """Configure, read what is compiled how, build."""
-    subprocess.run(["cmake", "--preset", "host"], cwd=ROOT, check=True, stdout=DEVNULL)
+    subprocess.run(["cmake", "--preset", "mutation"], cwd=ROOT, check=True, stdout=DEVNULL)
     libraries = {name: Library(name, {}) for name in TESTS}
     for entry in json.loads((BUILD / "compile_commands.json").read_text()):
         target = re.search(r"CMakeFiles/(\w+)\.dir/", entry["command"])
         if target and target[1] in libraries:
             file = Path(entry["file"]).relative_to(ROOT).as_posix()
             libraries[target[1]].commands[file] = shlex.split(entry["command"])
-    build = ["cmake", "--build", "--preset", "host", "--", "--quiet"]
+    build = ["cmake", "--build", "--preset", "mutation", "--", "--quiet"]
     subprocess.run(build, cwd=ROOT, check=True)
     return libraries
 
@@ -106,7 +106,7 @@ def list_tests(library: Library) -> None:
     sources = sorted((ROOT / TESTS[library.name]).glob("test_*.c"))
     names = {f"{start}{source.stem[5:]}{ending}": source for source in sources}
     if not names.keys() <= read_costs().keys():
-        subprocess.run(["ctest", "--preset", "host", "--quiet"], cwd=ROOT, check=True)
+        subprocess.run(["ctest", "--preset", "mutation", "--quiet"], cwd=ROOT, check=True)
     seconds = read_costs()
     for name, source in names.items():
         library.tests[f"test_{name}"] = seconds[name]

@@ -1,15 +1,13 @@
 """Put small mistakes into the sources, one at a time, and see whether the tests notice.
 
-    python tests/tools/mutate.py [--sample COUNT] [--python COUNT] [--only WORD] [--seed WORD]
-        [--workers COUNT]
+    studies/mutate [--sample COUNT] [--only WORD] [--seed WORD] [--workers COUNT]
 
 Mistakes are made from the syntax (mutants.py): of all of them a sample, the same in every run, over
-the core and the firmware (tried by the C tests) and over the Python package (by the tests that call
-what is changed). Beside these, a few picked by hand (mistakes.toml). A mutant that compiles to the
-same object is none. One that no test notices must be judged in survivors.toml. Ends with 1 where
-less than 95 % of the others are noticed, in Python 65 % (in a small sample, less than chance makes
-of that), where a mistake picked by hand is not, or where a judgement or mistake fits no source any
-more.
+the core and the firmware. The C tests try them. Beside these, a few picked by hand (mistakes.toml).
+A mutant that compiles to the same object does not count. One that no test notices must be judged in
+survivors.toml. Ends with 1 where less than 95 % of the others are noticed (in a small sample, less
+than chance makes of that), where a mistake picked by hand is not, or where a judgement or mistake
+fits no source any more.
 """
 
 import argparse
@@ -29,12 +27,10 @@ else:
     import tomli as tomllib
 
 import mutate_c
-import mutate_python
 from mutants import ROOT, Mutant, mutants_of
 
 TOOLS = Path(__file__).resolve().parent
 MIN_KILL_PERCENT = 95.0
-MIN_PYTHON_KILL_PERCENT = 65.0  # a sample had 75 (62 to 85); the aim is 95
 WHOLE_SAMPLE = 100  # mutants from which on the rate itself must be met
 NO_MUTANT = ("refused", "same")
 
@@ -118,18 +114,6 @@ def try_c(
         return try_all(mutants, count, workers, lambda m, worker: shops[worker].try_mutant(m))
 
 
-def try_python(mutants: Iterable[Mutant], count: int, workers: int) -> list[Outcome]:
-    """By the Python tests."""
-    if count == 0:
-        return []
-    tests = mutate_python.prepare()
-
-    def one(mutant: Mutant, _: int) -> str:
-        return mutate_python.try_mutant(mutant, mutate_python.tests_for(mutant, tests))
-
-    return try_all(mutants, count, workers, one)
-
-
 def max_survivors(count: int, least: float) -> int:
     """Of so many mutants, that ``least`` per cent are noticed; of a small sample as many as chance
     leaves in 19 of 20 samples where just that rate is met."""
@@ -156,30 +140,24 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--sample", metavar="COUNT", type=int, default=200, help="mutants of C")
-    parser.add_argument("--python", metavar="COUNT", type=int, default=40, help="and of Python")
+    parser.add_argument("--sample", metavar="COUNT", type=int, default=200, help="mutants")
     parser.add_argument("--only", metavar="WORD", default="", help="those whose text has this")
     parser.add_argument("--seed", metavar="WORD", default="", help="another sample")
     parser.add_argument("--workers", metavar="COUNT", type=int, default=2)
     options = parser.parse_args()
     judged = read_judged()
-    in_c, in_python = (
-        all_mutants(files, options.only, options.seed)
-        for files in (mutate_c.sources(), mutate_python.sources())
-    )
-    stale = judged - {mutant.key for mutant in (*in_c, *in_python)} if not options.only else set()
+    made = all_mutants(mutate_c.sources(), options.only, options.seed)
+    stale = judged - {mutant.key for mutant in made} if not options.only else set()
     for key in sorted(stale):
         print("   survivors.toml is stale:", " | ".join(key))
-    in_c, in_python = ([m for m in some if m.key not in judged] for some in (in_c, in_python))
     picked = [mistake for mistake in read_mistakes() if options.only in f"{mistake}"]
     libraries = mutate_c.read_libraries()
     of_hand = try_c(libraries, picked, len(picked), options.workers)
-    of_c = try_c(libraries, in_c, options.sample, options.workers)
-    of_python = try_python(in_python, options.python, options.workers)
+    unjudged = (mutant for mutant in made if mutant.key not in judged)
+    of_c = try_c(libraries, unjudged, options.sample, options.workers)
     right = [
         report("picked by hand", of_hand, 100),
-        report("made in C", of_c, MIN_KILL_PERCENT),
-        report("made in Python", of_python, MIN_PYTHON_KILL_PERCENT),
+        report("made from the syntax", of_c, MIN_KILL_PERCENT),
     ]
     return 0 if all(right) and not stale else 1
 

@@ -1,0 +1,167 @@
+/* eitskin: how much memory a context needs, and what it is made of.
+ *
+ * A workspace holds a context and its arrays. The arrays are listed once, below: eits_init lays
+ * them out by that list, and EITS_WORKSPACE_SIZE adds them up by it, so the two cannot disagree.
+ * The size is a constant expression where its arguments are, so that a program without a heap can
+ * declare the workspace as a static array. Everything else calls eits_workspace_size (context.h).
+ */
+#ifndef EITSKIN_SIZES_H
+#define EITSKIN_SIZES_H
+
+#include "eitskin/diagnostics.h"
+#include "eitskin/model.h"
+#include "eitskin/options.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- Units ---- */
+
+/* Each array starts at a multiple of 16 bytes. */
+#define EITS_ALIGN16(bytes) (((size_t)(bytes) + 15u) & ~(size_t)15u)
+#define EITS_REALS(count)   EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
+
+/* Bytes of a line of the processor's cache: panels start at a multiple, so that no vector of theirs
+ * lies across two lines. */
+#define EITS_LINE 64u
+
+/* ---- How many ---- */
+
+/* rank, rounded up to the eight lanes in which sums are made (csrc/src/base/vec.h). */
+#define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
+
+/* Numbers of an upper triangle of rank x rank whose rows begin at multiples of eight columns. */
+#define EITS_PADDED_TRIANGLE(rank) (EITS_STRIDE(rank) * (EITS_STRIDE(rank) + 8u) / 2u)
+
+/* Entries of a list that holds either pixels or folded rows. */
+#define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
+
+/* Columns of S that are kept unpacked as floats: more than a working set or a disc has. */
+#define EITS_MAX_CACHED 256u
+#define EITS_CACHED(n_pixels) \
+    ((size_t)((n_pixels) < EITS_MAX_CACHED ? (n_pixels) : EITS_MAX_CACHED))
+
+/* Columns that the touch test has room for: eight parameters each of eight touches, or four each of
+ * sixteen. */
+#define EITS_EVIDENCE_COLUMNS 64u
+
+/* Columns of a panel: S in panels has that many columns side by side, row after row, so that a
+ * product S'v fills vector registers without gathering. */
+#define EITS_PANEL 32u
+#define EITS_PANEL_COLUMNS(n_pixels) \
+    (((size_t)(n_pixels) + EITS_PANEL - 1u) / EITS_PANEL * EITS_PANEL)
+
+/* ---- The arrays of a workspace ---- */
+
+/* Every array: ARRAY(place, element, count), in the order in which they lie in memory. `place` is
+ * the member of the context that points to it; csrc/src/context/context.h says what is in it.
+ * n_cells is nx * ny. */
+/* clang-format off */
+#define EITS_WORKSPACE_ARRAYS(ARRAY, n_rows, n_folded, rank, n_pixels, n_cells)                    \
+    /* from a cell of the image to its pixel */                                                    \
+    ARRAY(cell, uint16_t, n_cells)                                                                 \
+    /* scratch: vectors that solvers, fit and test borrow from each other in turn */               \
+    ARRAY(scratch.value, eits_real, EITS_LIST(n_pixels, n_folded))                                 \
+    ARRAY(scratch.index, uint32_t, EITS_LIST(n_pixels, n_folded))                                  \
+    ARRAY(scratch.row[0], eits_real, EITS_STRIDE(rank))                                            \
+    ARRAY(scratch.row[1], eits_real, EITS_STRIDE(rank))                                            \
+    ARRAY(scratch.row[2], eits_real, EITS_STRIDE(rank))                                            \
+    ARRAY(scratch.row[3], eits_real, EITS_STRIDE(rank))                                            \
+    ARRAY(scratch.row[4], eits_real, EITS_STRIDE(rank))                                            \
+    ARRAY(scratch.row[5], eits_real, EITS_STRIDE(rank))                                            \
+    ARRAY(scratch.row[6], eits_real, EITS_STRIDE(rank))                                            \
+    ARRAY(scratch.row[7], eits_real, EITS_STRIDE(rank))                                            \
+    ARRAY(scratch.pixel[0], eits_real, n_pixels)                                                   \
+    ARRAY(scratch.pixel[1], eits_real, n_pixels)                                                   \
+    ARRAY(scratch.pixel[2], eits_real, n_pixels)                                                   \
+    /* the active set's factor, or the evidence's matrix: never both */                            \
+    ARRAY(scratch.square, eits_real, (size_t)(rank) * EITS_STRIDE(rank))                           \
+    /* the reference, a number per row of the protocol */                                          \
+    ARRAY(reference.v0, eits_real, n_rows)                                                         \
+    ARRAY(reference.m2, eits_real, n_rows)                                                         \
+    ARRAY(reference.row_gain, eits_real, n_rows)                                                   \
+    ARRAY(rows.masked, uint8_t, n_rows)                                                            \
+    ARRAY(rows.unusable, uint8_t, n_rows)                                                          \
+    /* a frame, a number per folded row, and reduced */                                            \
+    ARRAY(frame.sides, uint8_t, n_folded)                                                          \
+    ARRAY(frame.kept_sides, uint8_t, n_folded)                                                     \
+    ARRAY(frame.d, eits_real, n_folded)                                                            \
+    ARRAY(frame.reciprocity_error, eits_real, n_folded)                                            \
+    ARRAY(frame.y, eits_real, EITS_STRIDE(rank))                                                   \
+    ARRAY(frame.y_log, eits_real, EITS_STRIDE(rank))                                               \
+    ARRAY(projection.gain_drift, eits_real, n_folded)                                              \
+    /* up to rank directions, or one direction and the whitening's two triangles: never both */    \
+    ARRAY(projection.basis, eits_real, EITS_STRIDE(rank) + 2u * EITS_PADDED_TRIANGLE(rank))        \
+    ARRAY(whitening.row_scale, eits_real, EITS_STRIDE(rank))                                       \
+    ARRAY(whitening.row_strength, eits_real, EITS_STRIDE(rank))                                    \
+    ARRAY(range.off_range, eits_real, n_folded)                                                    \
+    ARRAY(range.inverse, eits_real, EITS_STRIDE(rank))                                             \
+    ARRAY(range.shrink, eits_real, EITS_STRIDE(rank))                                              \
+    /* coefficients and image, which outlive the frame, and the working set */                     \
+    ARRAY(solver.x, eits_real, n_pixels)                                                           \
+    ARRAY(solver.image, eits_real, n_pixels)                                                       \
+    ARRAY(solver.working, uint32_t, n_pixels)                                                      \
+    ARRAY(solver.working_slot, uint32_t, EITS_CACHED(n_pixels))                                    \
+    /* the touch fit: what the skin answers to each disc */                                        \
+    ARRAY(touch.y_separate, eits_real, EITS_STRIDE(rank))                                          \
+    ARRAY(touch.atoms, eits_real, EITS_MAX_TOUCHES * EITS_STRIDE(rank))                            \
+    /* the touch test: the errors' factor, and a column per parameter of a touch */                \
+    ARRAY(evidence.factor, eits_real, (size_t)(rank) * EITS_STRIDE(rank))                          \
+    ARRAY(evidence.column, eits_real, EITS_EVIDENCE_COLUMNS * EITS_STRIDE(rank))                   \
+    ARRAY(evidence.data, eits_real, EITS_STRIDE(rank))                                             \
+    ARRAY(evidence.left, eits_real, EITS_STRIDE(rank))                                             \
+    ARRAY(evidence.gain_drift, eits_real, EITS_STRIDE(rank))                                       \
+    /* columns of S as floats, and which they are */                                               \
+    ARRAY(columns.data, float, EITS_CACHED(n_pixels) * EITS_STRIDE(rank))                          \
+    ARRAY(columns.slot, uint16_t, n_pixels)                                                        \
+    ARRAY(columns.column, uint16_t, EITS_CACHED(n_pixels))                                         \
+    ARRAY(columns.wanted, uint8_t, EITS_CACHED(n_pixels))
+
+/* Those of a prepared context in addition: S, and the working set's columns, in panels. */
+#define EITS_PREPARED_ARRAYS(ARRAY, rank, n_pixels)                                                \
+    ARRAY(columns.panels, eits_real, EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank))                \
+    ARRAY(solver.working_panels, eits_real, EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank))
+/* clang-format on */
+
+/* What the lists are given as ARRAY, to add up bytes and pointers. */
+#define EITS_ADD_BYTES(place, element, count)   +EITS_ALIGN16((size_t)(count) * sizeof(element))
+#define EITS_ADD_POINTER(place, element, count) +sizeof(void *)
+
+/* ---- The context itself ---- */
+
+/* Pointers to the arrays above; 14 more, to the model and its S, to the kernels, and to what the
+ * solvers and the whitening borrow. */
+#define EITS_CONTEXT_POINTERS                                               \
+    (14u * sizeof(void *) EITS_WORKSPACE_ARRAYS(EITS_ADD_POINTER, , , , , ) \
+               EITS_PREPARED_ARRAYS(EITS_ADD_POINTER, , ))
+
+/* A touch that is followed: the touch, five numbers for its speed and covariance, and three counts,
+ * which in double width end at a multiple of eight bytes. */
+#define EITS_FOLLOWED_SIZE \
+    (sizeof(eits_touch) + 5u * sizeof(eits_real) + (sizeof(eits_real) == 8u ? 16u : 12u))
+
+/* Single numbers of the parts: 20 reals of reference and whitening, the shift of places by terms
+ * along x and y; 34 counts and flags; and 12 parts, each of which ends at a multiple of eight
+ * bytes. */
+#define EITS_CONTEXT_NUMBERS \
+    ((20u + 2u * EITS_MAX_MOVE_TERMS) * sizeof(eits_real) + (34u + 12u) * sizeof(uint32_t))
+
+/* Bytes of the context, at the workspace's start. csrc/src/api/setup.c asserts that it fits, and
+ * that little is left over. */
+#define EITS_CONTEXT_SIZE                                                         \
+    EITS_ALIGN16(sizeof(eits_options) + sizeof(eits_info) + EITS_MAX_ELECTRODES + \
+                 EITS_MAX_TOUCHES * EITS_FOLLOWED_SIZE + EITS_CONTEXT_POINTERS +  \
+                 EITS_CONTEXT_NUMBERS)
+
+/* Bytes of a workspace; n_cells is nx * ny. `prepared` is 1 to keep S and the working set's columns
+ * in panels as well, which is faster on hosts, else 0. */
+#define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)               \
+    (EITS_CONTEXT_SIZE EITS_WORKSPACE_ARRAYS(EITS_ADD_BYTES, n_rows, n_folded, rank, n_pixels, \
+                                             n_cells) +                                        \
+     ((prepared) ? EITS_LINE - 16u EITS_PREPARED_ARRAYS(EITS_ADD_BYTES, rank, n_pixels) : 0u))
+
+#ifdef __cplusplus
+}
+#endif
+#endif

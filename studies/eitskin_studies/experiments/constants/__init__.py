@@ -1,0 +1,85 @@
+"""Each constant of the core halved and doubled: what changes on judging scenes."""
+
+import subprocess
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from eitskin_emulator.core_on_qemu import checkout_root
+from eitskin_studies.experiments.constants.in_time import fast_scenes, gesture_scenes
+from eitskin_studies.experiments.constants.judged import Scene
+from eitskin_studies.experiments.constants.models import of_other_models, of_presses
+from eitskin_studies.experiments.constants.scenes import SceneMaker
+from eitskin_studies.experiments.constants.sweep import Effect, baselines, effects_of
+from eitskin_studies.experiments.constants.tables import tables_of, words_of
+from eitskin_studies.experiments.constants.variant import build_variant
+from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
+
+TITLE = "Constants halved and doubled, one at a time"
+
+
+def run(workspace: Workspace) -> ExperimentOutcome:
+    """All constants.
+
+    Raises:
+        UsageError: this is no checkout, there is no compiler, or no measured presses are given.
+    """
+    began = time.process_time()
+    variant = build_variant(workspace.folder / "variant")
+    scenes = _scenes(SceneMaker.of(workspace))
+    known = baselines(variant, scenes)
+    effects: dict[str, list[Effect]] = {}
+    seconds = time.process_time() - began
+    for constant in workspace.progress(variant.constants, "constants"):
+        facts = {"study": "constants", "name": constant.name, "value": constant.value,
+                 "scenes": [one.digest for one in known]}  # fmt: skip
+        kept = workspace.kept(
+            facts,
+            lambda constant=constant: _timed(  # type: ignore[misc]
+                lambda: effects_of(constant, variant, scenes, known)
+            ),
+        )
+        seconds += kept["seconds"]
+        effects[constant.name] = [Effect(**one) for one in kept["effects"]]
+    commit = _commit()
+    facts = {"commit": commit, "seconds": round(seconds), "scenes": len(scenes)}
+    return ExperimentOutcome(
+        tables_of(variant.constants, effects, commit),
+        {
+            **facts,
+            "constants": {
+                name: [asdict(effect) for effect in some] for name, some in effects.items()
+            },
+        },
+        {},
+        words_of(variant.constants, effects, scenes, facts),
+    )
+
+
+def _scenes(maker: SceneMaker) -> list[Scene]:
+    frames = maker.scenes()
+    return [
+        *frames, *of_other_models(maker, frames), *of_presses(maker), *gesture_scenes(maker),
+        *fast_scenes(maker),
+    ]  # fmt: skip
+
+
+def _timed(make: Any) -> dict[str, Any]:
+    import resource
+
+    def used() -> float:
+        return sum(
+            resource.getrusage(who).ru_utime + resource.getrusage(who).ru_stime
+            for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+        )
+
+    before = used()
+    effects: Sequence[Effect] = make()
+    return {"effects": [asdict(one) for one in effects], "seconds": used() - before}
+
+
+def _commit() -> str:
+    command = ["git", "-C", str(checkout_root()), "describe", "--always", "--dirty"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "unknown"
