@@ -93,8 +93,8 @@ make_environment() {
     "$python" -m venv "$venv"
 }
 
-# install_package EXTRAS: the project with these extras in the virtual environment, unless nothing changed since; with it the
-# emulated board, and for the tests the numpy reference, which only a checkout has.
+# install_package EXTRAS: the project with these extras in the virtual environment, unless nothing changed since; with it what only
+# a checkout has: the emulated board.
 install_package() {
     stamp=$venv/installed-$(printf '%s' "$1" | tr ',' '-')
     make_environment
@@ -102,10 +102,9 @@ install_package() {
         find_python
         say "installing eitskin[$1]: packages, and compiling the C core; about half a minute"
         touch "$stamp.next"
-        again="eitskin eitskin-emulator eitskin-reference"
+        again="eitskin eitskin-emulator"
         case $1 in
         build) packages "$root[$1]" ;;
-        test) packages "$root[$1]" "$root/firmware/emulator" "$root/python" ;;
         *) packages "$root[$1]" "$root/firmware/emulator" ;;
         esac
         mv "$stamp.next" "$stamp"

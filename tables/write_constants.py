@@ -55,14 +55,13 @@ def _c_value(value: Any, known: dict[str, Any], core: bool) -> str:
     return str(value)
 
 
-def python_constants(tables: Tables, package: str) -> Lines:
-    """Names and values of the core's modules, those of float64 where there are two, for the numpy
-    reference all, for eitskin what it reads; the table says the rest."""
+def python_constants(tables: Tables) -> Lines:
+    """Names and values that eitskin reads, those of float64 where there are two; the table says the
+    rest."""
     for module in tables["constants"]["module"]:
         rows = [row for group in module["group"] for row in group["rows"]]
-        if package == "eitskin":
-            rows = [row for row in rows if row[0] in module.get("package", ())]
-        if "header" in module or not rows:  # firmware has no twin
+        rows = [row for row in rows if row[0] in module.get("package", ())]
+        if not rows:
             continue
         yield from ("", f"# {module['name']}")
         for name, value, *_ in rows:

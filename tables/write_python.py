@@ -29,8 +29,7 @@ def python_modules(tables: Tables) -> Iterator[tuple[str, Lines]]:
     """Each module with its lines."""
     yield "python/eitskin/core/options_table.py", _options_module(tables)
     yield "python/eitskin/core/diagnostics_table.py", _diagnostics_module(tables)
-    for package, path in (("eitskin", "eitskin/core"), ("eitskin_reference", "eitskin_reference")):
-        yield f"python/{path}/constants_table.py", _constants_module(tables, package)
+    yield "python/eitskin/core/constants_table.py", _constants_module(tables)
     yield "python/eitskin/core/gestures_table.py", _gestures_module(tables)
     if "link" in tables:
         yield "python/eitskin/device/wire/link_table.py", _link_module(tables)
@@ -236,13 +235,13 @@ def _gestures_module(tables: Tables) -> Lines:
     yield from _class(types["eits_event_phase"] | {"python": "IntEnum EventPhase"})
 
 
-def _constants_module(tables: Tables, package: str) -> Lines:
+def _constants_module(tables: Tables) -> Lines:
     yield from docstring(
         "The core's numbers that are a choice; tables/constants.toml has their reasons."
         f" {origin('constants')}",
         "",
     )
-    yield from python_constants(tables, package)
+    yield from python_constants(tables)
 
 
 # ---- link ----

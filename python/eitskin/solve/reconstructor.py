@@ -1,10 +1,10 @@
 """Reconstruct images and touches from frames with one interface for all engines: the C core or the
-numpy reference."""
+numpy oracle."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,15 +19,12 @@ from eitskin.core.results import (
     check_options,
     check_shape,
 )
-from eitskin.errors import FrameError, ProtocolError, UsageError, missing_checkout
+from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.model.eitm import encode_model, load_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
+from eitskin.oracle.engine import OracleEngine
 from eitskin.skin.protocol import Protocol
-
-if TYPE_CHECKING:
-    from eitskin_reference.engine import ReferenceEngine
-
 
 ENGINES = ("c", "c64", "numpy")
 MIN_CORRELATION = 0.9
@@ -38,19 +35,14 @@ class Reconstructor:
     from frames.
 
     ``engine`` is "c" (the float32 core, as on the board), "c64" (the same source in float64) or
-    "numpy" (the reference, in a checkout only). Problems of a frame are detected, affected rows are
-    left out if that helps, and ``info.found`` names them (docs/reference/diagnostics.md); the
+    "numpy" (the oracle: what an image is by definition, each frame by itself, slow; its touches are
+    fitted in its own way and have no confidence). Problems of a frame are detected, affected rows
+    are left out if that helps, and ``info.found`` names them (docs/reference/diagnostics.md); the
     option ``diagnostics`` chooses what is checked.
 
     Raises:
         ModelError: the C core rejects the model.
         UsageError: the engine is unknown, an option is out of range, or the core is not built.
-        MissingExtraError: the numpy reference is not installed.
-
-    Raises:
-        ModelError: the C core refuses the model.
-        UsageError: an unknown engine, an option out of range, or the core is not built.
-        MissingExtraError: the numpy reference is not installed.
     """
 
     def __init__(
@@ -64,9 +56,9 @@ class Reconstructor:
         if engine not in ENGINES:
             raise UsageError(f"engine {engine!r} is not known; use one of {', '.join(ENGINES)}")
         self.model, self.engine = model, engine
-        self._engine: CoreEngine | ReferenceEngine
+        self._engine: CoreEngine | OracleEngine
         if engine == "numpy":
-            self._engine = _reference_engine(model)
+            self._engine = OracleEngine(model)
         else:
             self._engine = CoreEngine(
                 blob or encode_model(model), "float32" if engine == "c" else "float64"
@@ -165,15 +157,6 @@ class Reconstructor:
         """Forget the coefficients for the warm start and the tracked touches, so that the next
         frame does not depend on earlier ones."""
         self._engine.forget()
-
-
-def _reference_engine(model: Model) -> "ReferenceEngine":
-    """Return the numpy reference, which is in a package that the wheel does not contain."""
-    try:
-        from eitskin_reference.engine import ReferenceEngine
-    except ImportError:
-        raise missing_checkout("the engine numpy", "python") from None
-    return ReferenceEngine(model)
 
 
 def _numbers(values: npt.ArrayLike, what: str) -> FloatArray:

@@ -119,7 +119,7 @@ def _until(one: DrawnGesture) -> float:
 
 def _end(one: DrawnGesture) -> float:
     """A hold's end is when it has lasted long enough."""
-    from eitskin_reference.constants_table import HOLD_US
+    from eitskin.core.constants_table import HOLD_US
 
     return one.start_s + HOLD_US * 1e-6 if one.kind == "hold" else one.end_s
 

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from eitskin.model.model import Model
+from eitskin.oracle.engine import OracleEngine
+from eitskin.oracle.places import corrected
 from eitskin.scoring.matching import match
 from eitskin.solve.reconstructor import Reconstructor
 from other_worlds import WorldFactory, WorldScenes
@@ -63,10 +65,14 @@ def test_places_are_nearer_where_the_tare_tells_that_they_were_off(factory, name
     assert after < most_of_before * before
 
 
-def test_core_and_reference_correct_alike(factory):
-    scenes = factory.scenes("out_of_round_2_percent", 3, SEED)
-    c, numpy = (found_mm(prebuilt()[0], engine, scenes) for engine in ("c64", "numpy"))
-    off = found_mm(uncorrected(prebuilt()[0]), "c64", scenes)
-    assert max(np.abs(a - b).max() for a, b in zip(c, off, strict=True)) > 0.3
-    for one, other in zip(c, numpy, strict=True):
-        assert one == pytest.approx(other, abs=1e-3)
+def test_the_core_corrects_by_the_polynomial_of_the_definition(factory):
+    """Applied by the oracle to the places that are found without it."""
+    scenes, model = factory.scenes("out_of_round_2_percent", 3, SEED), prebuilt()[0]
+    oracle = OracleEngine(model)
+    found, off = found_mm(model, "c64", scenes), found_mm(uncorrected(model), "c64", scenes)
+    assert max(np.abs(a - b).max() for a, b in zip(found, off, strict=True)) > 0.3
+    for quiet_v, one, other in zip(scenes.quiet_v, found, off, strict=True):
+        oracle.set_reference(quiet_v)
+        assert oracle.reference is not None
+        expected = [corrected(model, oracle.reference.log_gain, place) for place in other]
+        assert one == pytest.approx(np.array(expected).reshape(-1, 2), abs=1e-3)

@@ -7,8 +7,8 @@ from made_models import made_blob, plain_options
 from soundness import Judged, judged
 
 from eitskin.core.results import Options
+from eitskin.oracle.lasso import greatest
 from eitskin_emulator.core_steps import Choose, Load, Solve, Step
-from eitskin_reference.problem import greatest
 from everywhere import Outcome, on_host
 
 RANK, COLUMNS = 20, 64

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eitskin_reference.problem import greatest
+from eitskin.oracle.lasso import greatest
 from everywhere import Outcome, as_float32
 from margins import Margins
 

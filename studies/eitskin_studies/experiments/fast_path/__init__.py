@@ -13,7 +13,7 @@ import numpy.typing as npt
 from eitskin.arrays import BoolArray, FloatArray
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
-from eitskin_studies.experiments.fast_path import adaptive, beyond
+from eitskin_studies.experiments.fast_path import beyond
 from eitskin_studies.experiments.fast_path.scans import (
     ROW_S,
     Outcome,
@@ -127,9 +127,8 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         f" {ELEMENTS} elements, contacts spread by 30 %, a tare of 64 frames; 100 us a row, drives"
         " by 7; the prebuilt model."
     )
-    ordered, orders = adaptive.compare(model, blob, settings, workspace.progress)
-    tables = (_table("rows", found), _table("beyond", more, 8), orders)
-    data = {"rows": found, "beyond": more, "orders": ordered}
+    tables = (_table("rows", found), _table("beyond", more, 8))
+    data = {"rows": found, "beyond": more}
     return ExperimentOutcome(tables, data, {}, {"sets": words, "unfounded": _unfounded(found)})
 
 

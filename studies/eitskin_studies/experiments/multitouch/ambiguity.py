@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from eitskin.arrays import BoolArray, FloatArray
+from eitskin.core.constants_table import CROWD_CLEAR, CROWD_FAR, CROWD_STRONG
 from eitskin.errors import missing_extra
 from eitskin.scoring.matching import match
-from eitskin_reference.constants_table import CROWD_CLEAR, CROWD_FAR, CROWD_STRONG
 from eitskin_studies.experiments.multitouch.counts import Share, share_of
 from eitskin_studies.experiments.multitouch.variants import SeenFrame
 

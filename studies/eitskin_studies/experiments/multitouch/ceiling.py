@@ -1,7 +1,7 @@
 """What limits the count: fits that are told where every touch is and begin there.
 
-*Core*: the reference of the core's own fit, given an image with its peaks at the true centres: if
-this is exact where the core is not, its search is at fault. *Nonlinear*: least squares on the
+*Discs*: the oracle's fit of discs, begun at the true centres: if this is exact where the core is
+not, its search is at fault. *Nonlinear*: least squares on the
 finite-element solution of another mesh, with nominal contacts and the true contrast: if this is
 exact where the core's fit is not, linearising is at fault; if it is not either, the data are.
 """
@@ -17,13 +17,13 @@ from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.fem.sensitivity import element_fields
 from eitskin.model.model import Model
+from eitskin.oracle.discs import Disc, DiscFit
+from eitskin.oracle.engine import OracleEngine
 from eitskin.scene.cover import Cover
 from eitskin.scene.random_touches import TouchScene, TrueTouch
 from eitskin.scoring.matching import GATE_MM, match
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
-from eitskin_reference.engine import ReferenceEngine
-from eitskin_reference.problem import Problem, SolveResult
 from eitskin_studies.harness.sessions import MeasuredFrames
 
 ELEMENTS = 3000
@@ -33,25 +33,21 @@ MIN_RADIUS_MM, MAX_RADIUS_MM = 1.0, 30.0
 CLEAR_DEVIATIONS = 3.0
 
 
-class Told(ReferenceEngine):
-    """The reference, whose image has a peak at the pixel of each place that it is told."""
+class Told(OracleEngine):
+    """The oracle, whose fit starts at the places that it is told."""
 
     def __init__(self, model: Model) -> None:
         super().__init__(model)
         self.places_mm: FloatArray = np.zeros((0, 2))
 
-    def _run(self, problem: Problem, last: FloatArray | None) -> SolveResult:
-        result, centres = super()._run(problem, last), self.model.grid.centres_mm()
-        weight, image = self.model.column_weight.astype(np.float64), np.zeros(len(centres))
-        for place in self.places_mm:
-            image[int(np.argmin(((centres - place) ** 2).sum(axis=1)))] = 1.0
-        return replace(
-            result, x=np.divide(image, weight, out=np.zeros_like(image), where=weight != 0)
-        )
+    def starts(self, fit: DiscFit, image: FloatArray) -> list[Disc]:
+        """Discs of the seed's radius at those places."""
+        radius_mm = self.options.touch_seed_radius_mm
+        return [Disc(float(x), float(y), radius_mm, 1.0) for x, y in self.places_mm]
 
 
 def core_told(model: Model, measured: MeasuredFrames, scenes: Sequence[TouchScene]) -> list[bool]:
-    """Whether the core's fit that begins at the truth is exact, for each scene."""
+    """Whether the fit that begins at the truth is exact, for each scene."""
     engine = Told(model)
     engine.set_reference(measured.quiet_v)
     exact = []

@@ -9,7 +9,7 @@ import numpy as np
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
 from eitskin_studies.experiments.tracking.counted import TrackCount, total
-from eitskin_studies.experiments.tracking.measured import PAIRINGS, Measurer, choices, counts, ways
+from eitskin_studies.experiments.tracking.measured import Measurer, choices, counts, ways
 from eitskin_studies.experiments.tracking.streams import (
     FRAMES,
     RATE_HZ,
@@ -149,10 +149,6 @@ def _passing(measurer: Measurer, seed: int, count: int) -> Table:
                     by[way.name] = counts(
                         measurer, streams, snr_db, way, f"passing, {snr_db} dB, {way.name}"
                     )
-            for name, pairing in PAIRINGS:
-                by[f"all, {name}"] = [
-                    measurer.count_paired(one, snr_db, pairing, name) for one in streams
-                ]
             for name, some in by.items():
                 whole = total(some)
                 found = f"{100 * (1 - whole.missed / whole.true):.1f}"

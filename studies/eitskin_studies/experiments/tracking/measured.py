@@ -17,7 +17,6 @@ from eitskin.scene.runner import simulate_frames
 from eitskin.scene.session import MeshCache
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_reference.tracker import Pairing, Tracker, nearest_pairs
 from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.experiments.tracking.counted import TrackCount, count_stream
 from eitskin_studies.experiments.tracking.streams import ELEMENTS, TouchStream
@@ -93,22 +92,6 @@ class Measurer:
 
         return TrackCount(**self.workspace.kept(facts, make))
 
-    def count_paired(
-        self, stream: TouchStream, snr_db: float, pairing: Pairing, name: str
-    ) -> TrackCount:
-        """Tracking by the numpy reference with another rule for who is who."""
-        facts = {
-            "what": "tracking by pairs",
-            "stream": stream.facts(),
-            "snr_db": snr_db,
-            "pairs": name,
-        }
-
-        def make() -> dict[str, object]:
-            return count_stream(stream, self._told_paired(stream, snr_db, pairing), 0).as_dict()
-
-        return TrackCount(**self.workspace.kept(facts, make))
-
     def told(
         self, stream: TouchStream, snr_db: float, options: Options
     ) -> tuple[list[tuple[Touch, ...]], int]:
@@ -118,21 +101,6 @@ class Measurer:
         return [one.touches for one in results], sum(
             one.info.macs + one.info.touch_macs for one in results
         )
-
-    def _told_paired(
-        self, stream: TouchStream, snr_db: float, pairing: Pairing
-    ) -> list[tuple[Touch, ...]]:
-        whole = tracking(default_options(self.model))
-        single = replace(default_options(self.model), detection_factor=whole.detection_factor)
-        tracker, told = Tracker(self.model.grid, pairing), []
-        for frame in self._start(stream, snr_db, single):
-            result = self._skin.reconstruct(frame)
-            told.append(
-                tracker.step(
-                    result.touches, whole, result.info.lambda_max, result.info.lambda_noise
-                )
-            )
-        return told
 
     def _start(self, stream: TouchStream, snr_db: float, options: Options) -> FloatArray:
         """Take the reference; returns the frames (f, m) V."""
@@ -163,31 +131,6 @@ class Measurer:
         return self.workspace.kept_arrays(
             {"what": "stream", "stream": stream.facts(), "elements": ELEMENTS}, make
         )["voltage_v"]
-
-
-def best_pairs(distance_mm: FloatArray, reach_mm: float) -> list[tuple[int, int]]:
-    """Pairs (row, column) with the least sum of squares, as many as possible within ``reach_mm``.
-
-    Raises:
-        MissingExtraError: scipy is not installed.
-    """
-    from eitskin.errors import missing_extra
-
-    try:
-        from scipy.optimize import linear_sum_assignment
-    except ImportError:
-        raise missing_extra("model", "scipy") from None
-    within = distance_mm <= reach_mm
-    cost = np.where(within, distance_mm**2, reach_mm**2 * (min(distance_mm.shape) + 1.0))
-    return [
-        (int(i), int(k)) for i, k in zip(*linear_sum_assignment(cost), strict=True) if within[i, k]
-    ]
-
-
-PAIRINGS: tuple[tuple[str, Pairing], ...] = (
-    ("nearest first", nearest_pairs),
-    ("least sum of squares", best_pairs),
-)
 
 
 def counts(

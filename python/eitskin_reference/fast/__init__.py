@@ -1,1 +1,0 @@
-"""The numpy reference of the fast path (csrc/src/fast): touches after each drive of a scan."""
