@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from eitskin.arrays import FloatArray
-from eitskin.fem.grid import grid_for
 from eitskin.model.build import BuildSettings, Linearisation, linearise, make_model
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.model.model import Model
@@ -115,27 +114,6 @@ def small(outline: str = "disk", kind: str = "adjacent", electrodes: int = 16) -
     skin = small_skin(outline, OUTLINES[outline](), electrodes)
     protocol = PROTOCOLS[kind](electrodes)
     return Small(skin, protocol, linearise(skin, protocol, pixels_across=PIXELS, elements=ELEMENTS))
-
-
-@cache
-def sheet_without_mesh(outline: str = "l", kind: str = "adjacent", electrodes: int = 8) -> Small:
-    """A skin whose linear answer is written down: each electrode a point of an infinite sheet. For
-    numbers that no mesher may change."""
-    skin = small_skin(outline, OUTLINES[outline](), electrodes)
-    protocol, grid = PROTOCOLS[kind](electrodes), grid_for(skin.outline, PIXELS)
-    at = skin.electrode_centres_mm()
-    away = grid.centres_mm()[:, None] - at
-    fields = 1e3 * away / (away**2).sum(axis=2, keepdims=True)  # (n, L, 2), 1/m
-    fields /= 2 * np.pi * skin.conductivity_s_per_m * skin.thickness_mm * 1e-3
-    i, j, k, m = protocol.drive_measure.astype(np.int64).T
-    drive, measure = fields[:, i] - fields[:, j], fields[:, k] - fields[:, m]
-    volume_m3 = (1e-3 * grid.pixel_mm) ** 2 * skin.thickness_mm * 1e-3
-    jacobian = -protocol.current_a * volume_m3 * (drive * measure).sum(axis=2).T
-    logs = np.log(np.linalg.norm(at[:, None] - at, axis=2) + np.eye(electrodes))
-    v0 = logs[i, m] - logs[i, k] + logs[j, k] - logs[j, m]
-    v0 *= protocol.current_a / (2 * np.pi * skin.conductivity_s_per_m * skin.thickness_mm * 1e-3)
-    linear = Linearisation(grid, jacobian, v0, 0, fields.transpose(0, 2, 1))
-    return Small(skin, protocol, linear)
 
 
 @cache

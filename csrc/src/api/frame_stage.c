@@ -1,14 +1,20 @@
-/* The frame stage: which rows are of use, data, whitening, projection, and what is wrong.
+/* The frame stage: from voltages to reduced data frame.y for any solver, with diagnostics on the
+ * way.
  *
- * From voltages to frame.y, ready for any solver. Finding faults and making data depend on each
- * other, so the order is: what rows say by themselves (no number, saturated); electrodes, by rows;
- * fold; outliers, by folded pairs, and fold again without them; reduce; what the model cannot give,
- * by reduced data, and fold and reduce again without a fold it names. At most one turn back each: a
- * frame takes a bounded time, whatever is wrong with it.
+ * Finding faults and computing data depend on each other, so the order is:
  *
- * In: the voltages, the reference. Out: frame.*, rows.*, info's diagnostics; `masked` rows left out
- * and `macs`. Errors are for frames that have no image: too many rows out (max_masked), all zero,
- * or no number where data overflow. */
+ *   1. faults that a row shows by itself (not a number, saturated);
+ *   2. faults of electrodes, from all their rows;
+ *   3. fold; outliers, from folded pairs; fold again without them;
+ *   4. reduce; model mismatch, from reduced data; fold and reduce again without a fold that it
+ * names.
+ *
+ * Each step back happens at most once, so that the time of a frame is bounded whatever is wrong
+ * with it.
+ *
+ * In: the voltages, the reference. Out: frame.*, rows.*, the diagnostics in info, the number of
+ * rows left out in `masked`, and `macs`. Errors are returned for frames that have no image: too
+ * many rows are left out (max_masked), all voltages are zero, or the data overflow. */
 #include "api/stages.h"
 #include "eitskin/frame.h"
 

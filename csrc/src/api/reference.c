@@ -1,14 +1,14 @@
 /* The reference frame and its noise, from one frame or learned from many.
  *
- * Learning runs frame by frame without storing any. The first half makes a mean; the second is
- * measured against it like frames to come, and the greatest max |S'y| seen is lambda_noise: what an
- * untouched skin shows at its worst, in the very unit of the detection threshold and of lambda. A
- * greatest over a few frames grows slowly with their number; a threshold wants that rather than an
- * rms.
+ * Learning takes one frame after the other and stores none. The first half of the frames makes a
+ * mean. The second half is measured against it as later frames will be. Their greatest max |S'y| is
+ * lambda_noise: the worst that the untouched skin shows, in the unit of the detection threshold and
+ * of lambda. A threshold needs this maximum rather than an rms, and it grows only slowly with the
+ * number of frames.
  *
- * Outliers are left out on the way (diagnostics/reference_outliers.c). An error leaves the
- * reference that there was where it can (eits_reference_set), or none (ready = 0) where learning
- * had begun. */
+ * Outliers are left out on the way (diagnostics/reference_outliers.c). After an error,
+ * eits_reference_set keeps the reference that there was; once learning has begun there is none
+ * (ready = 0). */
 #include "eitskin/frame.h"
 
 #include "api/constants.h"
@@ -19,15 +19,16 @@
 #include "frame/reference.h"
 #include "frame/whitening.h"
 
-/* Coefficients of another reference are no start. */
+/* Coefficients for another reference are not a valid start. */
 static eits_status fit(eits_context *ctx)
 {
     ctx->solver.warm = 0;
     return eits_fit_reference(ctx);
 }
 
-/* One frame says nothing of noise: what depends on it (detection threshold, raised
- * regularisation, tests against noise) stays off until frames are learned from. */
+/* A single frame does not show the noise. Everything that needs it (detection threshold, raised
+ * regularisation, tests against noise) stays off until a reference is learned from several frames.
+ */
 eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t length)
 {
     if (ctx == NULL || frame == NULL)

@@ -1,9 +1,10 @@
-/* What a context holds, part by part: inside the library.
+/* The parts of a context, for use inside the library.
  *
- * Each part belongs to one room, which alone writes it once it is laid out; the rooms above it
- * read. tests/python/core/test_rooms.py checks that, and that no room includes one above it. All
- * memory comes from the caller's workspace and is laid out once, by api/setup.c. "stride" is
- * EITS_STRIDE(rank): rank, rounded up to whole vectors of the kernels. */
+ * Each part belongs to one module (a folder of csrc/src). Once it is laid out, only that module
+ * writes it, and the modules above read it. tests/python/core/test_rooms.py checks this, and that
+ * no module includes one above it. All memory comes from the caller's workspace and is laid out
+ * once, by api/setup.c. "stride" is EITS_STRIDE(rank): rank, rounded up to whole vectors of the
+ * kernels. */
 #ifndef EITSKIN_CONTEXT_PARTS_H
 #define EITSKIN_CONTEXT_PARTS_H
 
@@ -32,43 +33,44 @@ typedef struct eits_reference_tracking {
 typedef struct eits_reference {
     /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them */
     eits_real *v0;
-    /* n_rows: what a row's data are multiplied by beside the gain; 1 where row gains are not in
-     * force */
+    /* n_rows: the factor of a row's data beside the gain; 1 if row gains are not used */
     eits_real *row_gain;
     uint32_t count; /* reference frames that are in v0 */
     uint32_t ready; /* 1: frames can be measured against it */
     eits_real v0_rms;
     eits_real gain;
-    /* how far v0 is from the model: rms over folds of log(gain v0 / v_ref); and, over its own rms,
-     * what rows differ by from their reciprocals */
+    /* distance of v0 from the model: rms over folds of log(gain v0 / v_ref); and the rms difference
+     * of rows from their reciprocals, relative to v0's rms */
     eits_real distance, reciprocity;
-    /* what the variance of a place grows by for what v0 tells of electrodes and outline, mm^2; 0
-     * where the model does not say */
+    /* the variance, mm^2, that errors of electrodes and outline, as v0 shows them, add to a place;
+     * 0 if the model does not state it */
     eits_real place_mm2;
-    eits_real place_trust; /* how much of what moves places is taken back, 0 to 1 */
-    /* mm, along x and y: what takes places back to where touches lie, by terms (frame/places.c) */
+    eits_real
+        place_trust; /* the fraction of the displacement of places that is corrected, 0 to 1 */
+    /* mm, along x and y: the polynomial's coefficients of that correction (frame/places.c) */
     eits_real shift_mm[2][EITS_MAX_MOVE_TERMS];
-    uint32_t row_gains; /* 1: in force */
-    uint32_t far;       /* 1: it is the instrument that is far from the model, not the skin */
+    uint32_t row_gains; /* 1: row gains are used */
+    uint32_t far;       /* 1: the instrument, not the skin, differs from the model */
     eits_real correlation;
     eits_real noise_v;
     eits_real lambda_noise;
     uint32_t outliers;
     eits_reference_tracking tracking;
-    /* n_rows. While several frames are learned from: sum of squared deviations, in m2_unit^2; while
-     * the reference follows the skin: sum of differences, NaN for a row that one of them lacks */
+    /* n_rows. While a reference is learned: the sum of squared deviations, in m2_unit^2. With
+     * reference tracking: the sum of the frames' differences, NaN for a row that one of them lacks
+     */
     eits_real *m2;
-    /* V: a power of two near the first reference frame's greatest voltage, so that squares are
-     * numbers */
+    /* V: a power of two near the greatest voltage of the first reference frame, so that squares
+     * neither overflow nor vanish */
     eits_real m2_unit;
-    uint32_t wanted;       /* frames that are to come in all */
-    uint32_t second_waits; /* the second reference frame is in m2 until there is a third */
+    uint32_t wanted;       /* the number of frames to learn from */
+    uint32_t second_waits; /* 1: the second reference frame is in m2, until the third one comes */
 } eits_reference;
 
-/* A row of eits_rows.masked that is left out of the reference frame at hand only. */
+/* A row of eits_rows.masked that is left out of the present reference frame only. */
 enum { EITS_MASKED_NOW = 2 };
 
-/* Which rows and electrodes are of use. Written by frame and diagnostics. */
+/* Which rows and electrodes are used. Written by frame and diagnostics. */
 typedef struct eits_rows {
     uint8_t *masked; /* n_rows: 1 by the caller, EITS_MASKED_NOW by a reference frame */
     /* n_rows: why a row is left out of this frame, bits of eits_row_state; 0: it is used */
@@ -84,38 +86,39 @@ typedef struct eits_frame {
     uint8_t *sides;      /* n_folded: EITS_SIDE_..., of the last frame */
     uint8_t *kept_sides; /* n_folded: the last solved frame's, while another is examined */
     eits_real *d;        /* n_folded: data */
-    /* n_folded: what the two rows of each fold differ by; 0 where one is in use */
+    /* n_folded: the difference of each fold's two rows; 0 if only one is in use */
     eits_real *reciprocity_error;
-    eits_real *y;       /* stride: reduced data, projected; what the solver is to explain */
+    eits_real *y;       /* stride: reduced data, projected: the solver's data */
     eits_real *y_log;   /* stride: the same of v0 log(v / v0) */
     uint32_t has_y_log; /* 1: y_log is this frame's */
 } eits_frame;
 
-/* Q: directions of the reduced data that carry no news are taken out. Written by frame. */
+/* Q: the projection that removes directions of the reduced data, such as gain drift. Written by
+ * frame. */
 typedef struct eits_projection {
-    /* orthonormal directions, up to rank of them, stride apart. Where rows left out are whitened
-     * again there is at most one, and the room behind it is the whitening's (below) */
+    /* orthonormal directions, up to rank of them, stride apart. If the rows that are left are
+     * whitened again, there is at most one, and the whitening (below) uses the memory behind it */
     eits_real *basis;
     uint32_t count;
-    uint32_t stale;  /* 1: basis and whitening do not fit the next frame, whatever its sides */
-    uint32_t builds; /* counts up with each build: others learn from it that theirs is stale */
-    /* n_folded: data of a drift of the gain; zeros where it is not ignored */
+    uint32_t stale;  /* 1: basis and whitening must be built again for the next frame */
+    uint32_t builds; /* counts the builds; by it others see that what they derived is out of date */
+    /* n_folded: the data that gain drift causes; zeros if it is not ignored */
     eits_real *gain_drift;
 } eits_projection;
 
-/* What there is of F, by which the solver's S is F S. */
+/* The form of F; the solver uses F S instead of S. */
 typedef enum eits_whitening_form {
-    /* F = 1: no row is left out and the regularisation is the model's, or the model has not the
-     * builder's form, or numbers overflow */
+    /* F = 1: no row is left out and the regularisation is the model's, or the model does not have
+     * the builder's form, or numbers overflow */
     EITS_WHITENING_STORED = 0,
     EITS_WHITENING_TRIANGLE = 1, /* rows are left out */
-    EITS_WHITENING_DIAGONAL = 2  /* none is, but the regularisation is raised */
+    EITS_WHITENING_DIAGONAL = 2  /* no row is left out, and the regularisation is raised */
 } eits_whitening_form;
 
 /* F (frame/whitening.h), for the sides and the noise in force. Written by frame/whitening. */
 typedef struct eits_whitening {
-    /* 1: the model's P and S have the builder's form, so that rows left out can be whitened again
-     */
+    /* 1: the model's P and S have the builder's form, so that the rest can be whitened again if
+     * rows are left out */
     uint32_t possible;
     eits_whitening_form form;
     /* stride: s_1 of the scaled Jacobian over that of each direction, and over w s_1 of the
@@ -126,21 +129,22 @@ typedef struct eits_whitening {
     eits_real s1_square;     /* |S_1|^2 */
     eits_real mu;            /* by which the model was whitened, over s_1^2 */
     eits_real mu_in_force;   /* of this frame */
-    eits_real square;        /* what F'F is scaled by */
+    eits_real square;        /* the scale of F'F */
     eits_real noise_ratio;   /* noise in max(S'F'y) over that with F = 1 */
-    /* |P|^2: what unit noise on the folded rows makes of |y|^2; less where mu is raised */
+    /* |P|^2: the mean |y|^2 of white noise of variance 1 on the folded rows; less if mu is raised
+     */
     eits_real energy;
     eits_real energy_stored; /* as with the model's mu */
     eits_real *map;    /* F as a triangle, or its diagonal: behind the basis' first direction */
     eits_real *metric; /* G, a triangle (frame/whitening.h): behind the map */
 } eits_whitening;
 
-/* What data the model can give at all: P's range. Written by diagnostics/model_mismatch. */
+/* The range of P: all data that the model can explain. Written by diagnostics/model_mismatch. */
 typedef struct eits_range {
-    uint32_t known;           /* 1: P's rows are orthogonal, so that it can be found out */
+    uint32_t known;           /* 1: P's rows are orthogonal, so that the range can be tested */
     eits_real *inverse;       /* stride: 1 / |P_i|^2 */
-    eits_real *shrink;        /* stride: so much of it as predicts d */
-    eits_real *off_range;     /* n_folded: what of the gain's drift the model cannot give */
+    eits_real *shrink;        /* stride: shrinkage weight per direction when predicting d */
+    eits_real *off_range;     /* n_folded: the part of gain drift that lies outside the range */
     uint32_t off_range_build; /* the projection.builds that it belongs to */
 } eits_range;
 
@@ -166,13 +170,13 @@ typedef struct eits_solve_state {
     eits_real *factor;
 } eits_solve_state;
 
-/* Memory of the touches' fit. Written by touch. */
+/* Memory of the touch fit. Written by touch. */
 typedef struct eits_touch_memory {
-    eits_real *atoms;      /* EITS_MAX_TOUCHES x stride: what the skin answers to each disc */
+    eits_real *atoms;      /* EITS_MAX_TOUCHES x stride: the data that each disc causes */
     eits_real *y_separate; /* stride: y less the touches' interaction */
 } eits_touch_memory;
 
-/* Memory of the test of touches. Written by evidence. */
+/* Memory of the touch test. Written by evidence. */
 typedef struct eits_evidence {
     eits_real *factor; /* rank x stride: R in the rows of a triangle, Sigma = R'R */
     /* EITS_EVIDENCE_COLUMNS x stride: R'^-1 times what each parameter moves the data by */
@@ -184,7 +188,7 @@ typedef struct eits_evidence {
     uint32_t columns_made; /* since the test of this frame began */
     uint32_t columns_kept; /* that it did not have to make again */
     uint32_t columns_most; /* in what is being tried; 0: any number */
-    uint32_t spent;        /* 1: more were wanted than options.test_columns allows */
+    uint32_t spent;        /* 1: the test wanted more columns than options.test_columns allows */
     uint32_t places_made;  /* 1: column has those of the next answer's discs without their shapes */
 } eits_evidence;
 
@@ -194,8 +198,8 @@ typedef struct eits_followed {
     eits_real vx_mm, vy_mm; /* a frame */
     /* covariance of place and velocity, along either axis */
     eits_real place_mm2, both_mm2, speed_mm2;
-    uint32_t seen;   /* frames that it was found in, as far as that is asked */
-    uint32_t missed; /* frames on end that it was not */
+    uint32_t seen;   /* frames in which it was found, counted up to a limit (touch/tracker.c) */
+    uint32_t missed; /* consecutive frames in which it was not */
     uint32_t faint;  /* 1: its own S'y was below that of noise when it was last found */
 } eits_followed;
 
@@ -206,10 +210,10 @@ typedef struct eits_tracker {
     uint32_t next_id;
 } eits_tracker;
 
-/* Memory that nobody owns. Each stage is lent all of it, hands it down to the functions that need
- * some, and finds it in disorder afterwards; a function that calls others with it says in its
- * comment, or by its locals' names, what it keeps where meanwhile. While a solver runs, its vectors
- * (eits_solve_state) are these: row 0 to 4, pixel 0 to 2 and square. */
+/* Memory that no module owns. Each stage may use all of it, and hands it down to the functions that
+ * it calls; they leave it with undefined content. A function that keeps something in it across such
+ * a call says in its comment, or by the names of its variables, what it keeps where. While a solver
+ * runs, its vectors (eits_solve_state) are rows 0 to 4, pixels 0 to 2 and square. */
 typedef struct eits_scratch {
     eits_real *value; /* max(n_pixels, n_folded): what columns are multiplied by, with scales */
     uint32_t *index;  /* as many: which columns */

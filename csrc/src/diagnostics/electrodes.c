@@ -1,23 +1,24 @@
-/* Open electrodes and bridged pairs: all the rows that would tell otherwise are dead.
+/* Open electrodes and bridged pairs, found by rows that are dead.
  *
- * A detached electrode or a bridge spoils every row that uses it, by far more than a touch does; in
- * the image that is a touch that nobody made. docs/reference/diagnostics.md has the rules, and
+ * A detached electrode or a bridge spoils every row that uses it, by far more than a touch does,
+ * and would show as a false touch. docs/reference/diagnostics.md has the rules, and
  * studies/results/diagnostics.md what they cost and how often they fail.
  *
  * Method: each row that has a clear reference is alive, dead (about nothing where there should be a
- * voltage) or turned (of the other sign, which no change of conductivity can do). An electrode
- * none of whose rows is alive is open; a pair whose electrodes are both alive elsewhere, but in no
- * row across the pair, is bridged. No single row is trusted: three have to agree, since two may
- * fail together for other reasons (EITS_ROWS_TO_JUDGE).
+ * voltage) or turned (of the other sign, which no change of conductivity can cause). An electrode
+ * is open if none of its rows is alive. A pair is bridged if both electrodes are alive in other
+ * rows, but no row across the pair is. Three rows have to agree (EITS_ROWS_TO_JUDGE), since two may
+ * fail together for other reasons.
  *
- * In: the frame's voltages, the reference with its noise, rows.unusable as far as rows say it by
- * themselves. Out: rows.electrode, rows.unusable, info. Nothing is multiplied: a few comparisons a
- * row and electrode. Rows are judged again at each look instead of stored: it takes no memory. */
+ * In: the frame's voltages, the reference with its noise, and in rows.unusable the faults that each
+ * row shows by itself. Out: rows.electrode, rows.unusable, info. The cost is a few comparisons per
+ * row and electrode. Rows are judged again whenever they are needed, which saves the memory to
+ * store it. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"
 
-enum { DEAD = 1, ALIVE = 2, TURNED = 4 }; /* 0: a row that tells nothing */
+enum { DEAD = 1, ALIVE = 2, TURNED = 4 }; /* 0: a row that allows no conclusion */
 
 typedef struct limits {
     eits_real significant, noise;
@@ -76,15 +77,16 @@ static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
     return (any & (unsigned)state) != 0;
 }
 
-/* What the rows tell of each electrode: how many tell, and of those that drive with it how many are
- * silent, both as far as that matters, FLOWS once one is not. */
-typedef struct told {
+/* Counts for each electrode, up to EITS_ROWS_TO_JUDGE: `rows`, how many rows allow a conclusion
+ * about it; `silent`, how many of those that drive with it are dead, or FLOWS if one of them is
+ * not. */
+typedef struct evidence {
     uint8_t rows[EITS_MAX_ELECTRODES], silent[EITS_MAX_ELECTRODES];
-} told;
+} evidence;
 
 enum { FLOWS = UINT8_MAX };
 
-static void tell(told *of, uint8_t *alive, const uint8_t *row, int state, int usable)
+static void count_row(evidence *of, uint8_t *alive, const uint8_t *row, int state, int usable)
 {
     for (uint32_t k = 0; k < 4; ++k) {
         const uint8_t e = row[k];
@@ -100,8 +102,8 @@ static void tell(told *of, uint8_t *alive, const uint8_t *row, int state, int us
     }
 }
 
-/* Whether it drives with several others in rows that tell: with one alone, a bridge between the two
- * would stop its current as well. */
+/* Whether electrode e drives with several others, in rows that allow a conclusion. With only one
+ * partner, a bridge between the two would stop its current as well. */
 static int has_partners(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t e)
 {
     uint32_t partner = EITS_MAX_ELECTRODES;
@@ -117,18 +119,19 @@ static int has_partners(const eits_context *ctx, const eits_real *frame, limits 
     return 0;
 }
 
-/* All significant rows of an open electrode are dead; or no current flows by way of it, whoever is
- * its partner, and it floats where it is measured. A row without a number or saturated says nothing
- * of a current. Were all open, it would not be the electrodes. Returns whether any is not; `alive`
- * says which have rows that live. */
+/* Find the open electrodes. An electrode is open if all its significant rows are dead; or if no
+ * current flows through it with any partner, and it floats where it is measured. A row that is
+ * saturated or not a number shows nothing about a current. Returns 0 if all electrodes seem open,
+ * since then the fault is elsewhere. `alive` gets 1 for each electrode that has a row which is
+ * alive. */
 static int find_open(eits_context *ctx, const eits_real *frame, limits lim, uint8_t *alive)
 {
-    told of;
+    evidence of;
     memset(&of, 0, sizeof of);
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const int state = judge_row(ctx, frame, lim, i);
         if (state != 0)
-            tell(&of, alive, eits_row(ctx, i), state, ctx->rows.unusable[i] == 0);
+            count_row(&of, alive, eits_row(ctx, i), state, ctx->rows.unusable[i] == 0);
     }
     uint8_t *is_open = of.silent;
     uint32_t judged = 0, open = 0;

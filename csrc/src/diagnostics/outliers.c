@@ -1,10 +1,10 @@
-/* Outliers: rows that their reciprocals, or all the other folds, do not bear out; too many that
- * share an electrode: a noisy one.
+/* Outliers: rows that disagree with their reciprocals, or with all the other folds. If too many
+ * outliers share an electrode, the electrode is noisy.
  *
  * By reciprocity a row and the row with drive and measurement exchanged give the same voltage,
- * whatever the conductivity is (a symmetric linear network). A fold whose two sides differ thus
- * has a wrong reading, and no touch can look like one. Which side is wrong, reciprocity does not
- * say: that is decided by what all other folds predict.
+ * whatever the conductivity is (a symmetric linear network). If the two sides of a fold differ, one
+ * reading is wrong, and no touch can cause that. Reciprocity does not show which side is wrong: the
+ * prediction from all other folds decides that.
  *
  * The prediction is a ridge fit of the data by the model. P's rows are
  * orthogonal, scaled singular vectors of the Jacobian, so the fit is H = P' diag(shrink) P with
@@ -149,8 +149,9 @@ static void fit_all(eits_context *ctx, const eits_scratch *scratch, uint64_t *ma
     *macs += (uint64_t)folds * rank;
 }
 
-/* What the other folds predict for each of `n` flagged ones: with H the ridge fit, e = (I -
- * H_FF)^-1 (d - H d)_F is what d is off by. 0: they cannot be told from these. */
+/* Predict each of the `n` flagged folds F from the other folds, into `out`. With H the ridge fit,
+ * the error of d is e = (I - H_FF)^-1 (d - H d)_F. Returns 0 if the others do not determine these
+ * folds. */
 static int predict(eits_context *ctx, const eits_scratch *scratch, const uint32_t *flagged,
                    uint32_t n, eits_real *out, uint64_t *macs)
 {

@@ -1,17 +1,18 @@
-/* Outliers in reference frames: a reading that its reciprocal does not bear out is left out of the
+/* Outliers in reference frames: a reading that disagrees with its reciprocal is left out of the
  * reference.
  *
- * A wrong reading in a frame spoils that frame; one in the reference spoils all that follow, and
- * raises the learned noise so that faint touches are missed. Outliers of frames are judged by a
- * noise that is only being learned here, so this room has rules of its own: changes between frames
- * are compared with each other.
+ * A wrong reading in a frame spoils that frame. A wrong reading in the reference spoils all later
+ * frames, and raises the learned noise, so that faint touches are missed. Outliers of later frames
+ * are judged by the noise, which is not known yet here. Reference frames therefore have rules of
+ * their own, which compare changes between frames with each other.
  *
- * Method: between two frames of an untouched skin each row changes by noise, and a row and its
- * reciprocal by drift alike. So the difference of the two changes is the oddity of a fold; odd is
- * what exceeds a multiple of the median oddity (1.4826 median is the standard deviation where noise
- * is normal), a part of the greatest voltage, and a part of the fold's own. Three limits, as none
- * alone does: the median may be zero on quantised voltages, small rows jump by much of themselves,
- * large ones have noise in proportion.
+ * Method: between two frames of an untouched skin each row changes by noise and drift, and drift
+ * changes a row and its reciprocal alike. The oddity of a fold is the difference of these two
+ * changes. A fold is an outlier if its oddity exceeds three limits: a multiple of the median oddity
+ * (for normal noise, 1.4826 times the median is the standard deviation), a fraction of the greatest
+ * voltage, and a fraction of the fold's own voltage. No single limit suffices: the median may be
+ * zero on quantised voltages, small rows jump by a large fraction of themselves, and the noise of
+ * large rows grows with them.
  *
  * In: a reference frame and the mean so far, or the first two frames. Out: EITS_MASKED_NOW in
  * rows.masked for the reading at fault, until eits_reference_unmask. */

@@ -97,7 +97,7 @@ uint64_t eits_macs_to_finish(const eits_context *ctx, uint32_t count)
 
 /* Whether the limit leaves room for `macs`, S x of one more column, and the gap after it.
  *
- * Once a step is too dear the solve ends; what is cheaper is not tried instead, so that the
+ * Once a step is too expensive the solve ends. Cheaper steps are not tried instead, so that the
  * result does not depend on the order of tests. */
 int eits_active_affords(const eits_context *ctx, eits_active *a, uint64_t macs)
 {
@@ -123,8 +123,8 @@ void eits_active_drop(eits_context *ctx, eits_active *a, uint32_t place)
     a->sign[place] = a->sign[last];
 }
 
-/* Hold column j without a row of the factor's: only where the solve ends or another solver goes on.
- */
+/* Make column j active without a row in the factor. Only if the solve ends then, or FISTA
+ * continues. */
 static void activate_dependent(eits_context *ctx, uint32_t j, eits_real x)
 {
     ctx->solver.working[ctx->solver.working_count] = j;
@@ -150,9 +150,9 @@ static eits_real read_column(eits_context *ctx, eits_active *a, uint32_t j)
     return square > EITS_INDEPENDENT * before ? square : 0;
 }
 
-/* a->step = the combination of the active columns that comes nearest to the new one; returns what
- * it leaves of its square. */
-static eits_real what_is_left(eits_context *ctx, eits_active *a, eits_real square)
+/* a->step = the combination of the active columns that is nearest to the new one. Returns the
+ * square of the part of the new column that it does not give. */
+static eits_real part_left(eits_context *ctx, eits_active *a, eits_real square)
 {
     const uint32_t count = ctx->solver.working_count;
     ctx->kernels->dots(&ctx->model->sensitivity, ctx->solver.working, count,
@@ -160,11 +160,11 @@ static eits_real what_is_left(eits_context *ctx, eits_active *a, eits_real squar
     eits_factor_solve(ctx, count, a->step, a->work, a->step);
     ctx->info.macs += (uint64_t)count * ctx->model->rank + eits_adjoint_macs(ctx) +
                       eits_factor_macs(count) + count;
-    /* What the projection on the active columns leaves: |s_j|^2 - |K S_A's_j|^2, by Pythagoras. */
+    /* By Pythagoras: |s_j|^2 - |K S_A's_j|^2. */
     return square - eits_dot(ctx->kernels, a->work, a->work, count);
 }
 
-/* Column j becomes active, with what_is_left's combination in a->step as its new factor row. */
+/* Column j becomes active, with part_left's combination in a->step as its new factor row. */
 static void activate(eits_context *ctx, eits_active *a, uint32_t j, eits_real x, eits_real sign,
                      eits_real pull, eits_real left)
 {
@@ -224,7 +224,7 @@ void eits_active_add(eits_context *ctx, eits_active *a, uint32_t j)
             break;
         if (first && !((square = read_column(ctx, a, j)) > 0))
             return;
-        const eits_real left = what_is_left(ctx, a, square);
+        const eits_real left = part_left(ctx, a, square);
         if (count < a->max && left > EITS_INDEPENDENT * square) {
             activate(ctx, a, j, sign * x, sign, pull, left);
             return;
@@ -256,7 +256,7 @@ int eits_active_begin_warm(eits_context *ctx, eits_active *a)
             x != 0 && ctx->solver.working_count < a->max ? read_column(ctx, a, j) : 0;
         if (!(square > 0))
             continue;
-        const eits_real left = what_is_left(ctx, a, square);
+        const eits_real left = part_left(ctx, a, square);
         if (left > EITS_INDEPENDENT * square)
             activate(ctx, a, j, x, x > 0 ? 1 : -1, 0, left);
     }

@@ -1,6 +1,7 @@
-/* The active set's columns as they come and go, and their factor: rows K that make them
- * orthonormal, K G K' = 1, G their products: G^-1 = K'K without a chain of divisions. A reflection
- * of the rows keeps that, so a column goes by the one that leaves it to the last row alone. */
+/* The active set's columns as they are added and dropped, and their factor K. With G the matrix of
+ * the columns' products, K G K' = 1, so that G^-1 = K'K without a chain of divisions. Any
+ * reflection of K's rows keeps this. To drop a column, one reflects it into the last row and drops
+ * that row. */
 #ifndef EITSKIN_ACTIVE_COLUMNS_H
 #define EITSKIN_ACTIVE_COLUMNS_H
 
@@ -8,21 +9,21 @@
 
 typedef struct eits_active {
     eits_real lambda;
-    eits_real tolerance; /* a correlation beyond lambda by no more than this is rounding */
-    uint32_t max;        /* columns that can be independent */
-    /* of each active column: its correlation less lambda times its sign; zero at the optimum */
+    eits_real tolerance; /* a correlation may exceed lambda by this much through rounding */
+    uint32_t max;        /* the most columns that can be independent */
+    /* per active column: its correlation less lambda times its sign; zero at the optimum */
     eits_real *pull;
-    /* of each active column: that of its coefficient, or of the correlation that brought it in */
+    /* per active column: the sign of its coefficient, or of the correlation when it was added */
     eits_real *sign;
     eits_real *work;
     eits_real *step;
-    eits_real *reach;  /* of each active column: what fraction of the step it can go */
-    eits_real *column; /* the new column's part that counts */
-    eits_nearby near;  /* columns beside the active ones, now or before */
-    int limited;       /* the limit of MACs leaves no room for the next step */
-    int loose;         /* a column is active that the factor does not have */
-    int broken;        /* the factor is of no use */
-    int moved;         /* x is not as it was before the last columns were taken in */
+    eits_real *reach;  /* per active column: the fraction of the step that it can go */
+    eits_real *column; /* the new column, whitened and projected */
+    eits_nearby near;  /* columns beside those that are or were active */
+    int limited;       /* 1: mac_limit does not allow the next step */
+    int loose;         /* 1: a column is active that the factor lacks */
+    int broken;        /* 1: the factor gives numbers that are not finite */
+    int moved;         /* 1: x has changed since the last columns were added */
 } eits_active;
 
 /* w = K b, d = K'w = G^-1 b, of the first `count` columns. All have room for EITS_STRIDE(count);
@@ -30,28 +31,28 @@ typedef struct eits_active {
 void eits_factor_solve(const eits_context *ctx, uint32_t count, eits_real *b, eits_real *w,
                        eits_real *d);
 
-/* Multiply-accumulates of a solve, and of a drop. */
+/* Multiply-accumulates of a solve with the factor, and of dropping a column. */
 static inline uint64_t eits_factor_macs(uint32_t count)
 {
     return 2u * (uint64_t)count * count;
 }
 
-/* Multiply-accumulates of the gap at the end, with S x of `count` columns. */
+/* Multiply-accumulates of S x with `count` columns and the gap, at the end of a solve. */
 uint64_t eits_macs_to_finish(const eits_context *ctx, uint32_t count);
 
-/* Whether the limit leaves room for `macs`, S x of one more column, and the gap after it; if not,
- * a->limited is set and it never does again. */
+/* Whether mac_limit allows `macs`, S x with one more column, and the gap after it. If it does not,
+ * a->limited is set, and all later calls return 0. */
 int eits_active_affords(const eits_context *ctx, eits_active *a, uint64_t macs);
 
-/* Take the active column at `place` out; the last one takes its place. Uses a->work and a->step. */
+/* Drop the active column at `place`; the last one takes its place. Uses a->work and a->step. */
 void eits_active_drop(eits_context *ctx, eits_active *a, uint32_t place);
 
-/* Take column j in at zero, solver.gradient[j] being its correlation; one that is but rounding
- * stays out. Sets a->limited, a->loose and a->moved where they come true. */
+/* Add column j with the coefficient zero; solver.gradient[j] is its correlation. A column that is
+ * only rounding is not added. Sets a->limited, a->loose and a->moved if they become true. */
 void eits_active_add(eits_context *ctx, eits_active *a, uint32_t j);
 
-/* Make a warm start's coefficients in solver.x (n_pixels) the active columns, without those that
- * depend on others. Returns 0, nothing changed, where the limit of MACs leaves no room for that. */
+/* Make the columns of a warm start's coefficients, in solver.x (n_pixels), active, except those
+ * that depend on others. Returns 0 if mac_limit does not allow it; nothing is then changed. */
 int eits_active_begin_warm(eits_context *ctx, eits_active *a);
 
 #endif

@@ -41,7 +41,6 @@ static eits_real choose_lambda(const eits_context *ctx)
     return by_data > by_noise ? by_data : by_noise;
 }
 
-/* x = 0 is the answer: for the reason given. */
 void eits_answer_zero(eits_context *ctx, eits_stop why)
 {
     start_from_zero(ctx);
@@ -102,8 +101,8 @@ static void run(eits_context *ctx, const eits_scratch *scratch, int gradient_kno
 /* info holds what the frame stage counted, and zeros; `from_last`: start from the last
  * coefficients.
  *
- * Every way out leaves x, image and info consistent: an image of zeros where there is none, with
- * the reason in info.stop, and no number that is not finite. */
+ * Whichever way it returns, x, image and info agree and are finite. If there is no image, it is
+ * zero and info.stop has the reason. */
 eits_status eits_solve_frame(eits_context *ctx, const eits_scratch *scratch, int from_last)
 {
     const eits_options *o = &ctx->options;

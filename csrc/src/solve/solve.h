@@ -9,7 +9,7 @@
  * Errors: EITS_E_NOT_FINITE. */
 eits_status eits_solve_frame(eits_context *ctx, const eits_scratch *scratch, int from_last);
 
-/* x = 0 is the answer: for the reason given. */
+/* The result is x = 0, for the reason `why`. */
 void eits_answer_zero(eits_context *ctx, eits_stop why);
 
 /* ---- the solvers ----
@@ -53,20 +53,20 @@ void eits_take_gradient(eits_context *ctx, const eits_real *sx);
  * eits_take_gradient leaves them. */
 eits_duality_gap eits_duality_gap_of(const eits_context *ctx, eits_real lambda, eits_layout layout);
 
-/* Both in one. */
+/* eits_take_gradient at solver.sx, then eits_duality_gap_of. */
 eits_duality_gap eits_find_duality_gap(eits_context *ctx, eits_real lambda, eits_layout layout);
 
-/* The same at x = 0, of what info knows: no product is needed. */
+/* The same at x = 0, from info alone: no product is needed. */
 eits_duality_gap eits_duality_gap_at_zero(const eits_context *ctx, eits_real lambda);
 
 /* Multiply-accumulates of eits_take_gradient, solver.sx being known. */
 uint64_t eits_gradient_macs(const eits_context *ctx);
 
-/* 1 where `macs` more stay within the limit, or there is none. */
+/* 1 if `macs` more stay within mac_limit, or if there is no limit. */
 int eits_affords(const eits_context *ctx, uint64_t macs);
 
-/* What the objective may not exceed, with room for rounding: that of x = 0. Above it nothing was
- * won. */
+/* The greatest objective that a result may have: that of x = 0, and a little for rounding. A result
+ * above it is worse than no image. */
 eits_real eits_ceiling(const eits_context *ctx);
 
 /* Gap and residual into info. */
@@ -89,7 +89,7 @@ void eits_working_set_prune(eits_context *ctx, eits_real lambda);
 /* Spread solver.x over all columns again. */
 void eits_working_set_end(eits_context *ctx);
 
-/* 1 where a column at rest with this gradient would move. */
+/* 1 if a column at x = z = 0 with this gradient would move. */
 int eits_moves(eits_real gradient, eits_real lambda, eits_sign sign);
 
 /* out = the working set's S' v, by its panels if there are any, else from the columns. */
@@ -99,8 +99,8 @@ void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real
 uint32_t eits_apply_working(const eits_context *ctx, const eits_scratch *scratch,
                             const eits_real *x, eits_real *out);
 
-/* Keep the working set's columns at hand: those of S that are not cached yet are unpacked, and in a
- * prepared context their panels copied. Needed after each change of solver.working. */
+/* Unpack the working set's columns that are not in the column cache yet and, in a prepared context,
+ * copy their panels. Needed after each change of solver.working. */
 void eits_pack_panels(eits_context *ctx);
 
 #endif

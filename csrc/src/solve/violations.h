@@ -1,10 +1,10 @@
-/* Which columns the active set is to take in. */
+/* Which columns the active set adds next: those at zero that violate the KKT conditions most. */
 #ifndef EITSKIN_VIOLATIONS_H
 #define EITSKIN_VIOLATIONS_H
 
 #include "context/context.h"
 
-/* Columns that were active after one of a solve's steps, and those that show the pixels beside
+/* The columns that were active after some step of this solve, and those of the pixels beside
  * theirs. */
 typedef struct eits_nearby {
     uint32_t *column;
@@ -12,15 +12,14 @@ typedef struct eits_nearby {
     uint32_t count;
 } eits_nearby;
 
-/* 1 where v[j] (n_pixels numbers) is the greatest among its neighbours in the image; of equals the
- * first is. Beyond the image's edge the edge is seen again, and for a pixel that is not there j
- * itself. */
+/* 1 if v[j] (of n_pixels numbers) is the greatest among its neighbours in the image; of equal ones,
+ * the first. Neighbours beyond the image's edge, or off the skin, do not count. */
 int eits_is_peak(const eits_context *ctx, const eits_real *v, uint32_t j);
 
-/* None yet; the list is kept in what solver.image and solver.z point to. */
+/* An empty list. Its memory is that of solver.image and solver.z. */
 eits_nearby eits_nearby_none(const eits_context *ctx);
 
-/* Add the active ones, and those beside them. */
+/* Add the active columns, and those beside them. */
 void eits_nearby_add(const eits_context *ctx, eits_nearby *near);
 
 /* solver.gradient = S' F' solver.residual for these columns, zero elsewhere; counts into

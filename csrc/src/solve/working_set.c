@@ -95,7 +95,7 @@ void eits_working_set_choose(eits_context *ctx, const eits_scratch *scratch, eit
     eits_pack_panels(ctx);
 }
 
-/* Between looks: the gradient of the set is at hand, so leaving out costs nothing. */
+/* Between looks the gradient of the set is known anyway, so leaving columns out costs nothing. */
 void eits_working_set_prune(eits_context *ctx, eits_real lambda)
 {
     const uint32_t before = ctx->solver.working_count;
