@@ -1,6 +1,6 @@
 #include "eitskin/types.h"
 
-/* A switch without a default: a compiler names the case that a new status lacks. */
+/* The switch has no default, so that the compiler reports a new status that has no case. */
 const char *eits_status_text(eits_status status)
 {
     switch (status) {
@@ -43,7 +43,7 @@ const char *eits_status_text(eits_status status)
     return "unknown status";
 }
 
-/* Two macros, so that the number is put in before it becomes text. */
+/* Two macros are needed, so that the number is put in before it becomes text. */
 #define TEXT_OF(x) #x
 #define TEXT(x)    TEXT_OF(x)
 
