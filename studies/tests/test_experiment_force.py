@@ -69,7 +69,7 @@ def test_less_noise_shows_less_load(done):
     assert thresholds[-1, 0] > thresholds[-1, 3]  # the centre needs more
     for one in found:
         share, upper = one.false_share()
-        assert share < upper <= 1 and one.quiet == 80
+        assert share < upper <= 1 and one.untouched == 80
 
 
 def test_under_the_sheet_the_peak_rises_outwards_and_means_see_less(done):

@@ -138,7 +138,7 @@ def test_random_scenes_are_those_of_compare():
     touches, mesh = random_touches(SKIN.outline, 5, 3, "test"), mesh_for_elements(SKIN, ELEMENTS)
     theirs = simulate(SKIN, adjacent(16), touches, mesh=mesh)
     ours = session("random").measured(60.0, 80, "full", 1)
-    assert np.array_equal(ours.quiet_v, theirs.quiet_v)
+    assert np.array_equal(ours.untouched_v, theirs.untouched_v)
     assert np.array_equal(ours.frames_v[:, 0], theirs.frames_v)
     held = session("random").measured(60.0, 80, "full", 4)
     assert np.array_equal(held.frames_v[:, -1], theirs.frames_v)
@@ -155,7 +155,7 @@ def test_noise_falls_with_the_root_of_the_samples_and_stays_the_same_noise():
     assert noise[80].std() / noise[320].std() == pytest.approx(2, rel=0.1)
     assert np.corrcoef(noise[20].ravel(), noise[80].ravel())[0, 1] > 0.99
     fine = one.measured(80.0, 80, "full", 1).frames_v[:, 0] - one.exact_v
-    expected = np.sqrt((one.exact_quiet_v**2).mean()) * 1e-4
+    expected = np.sqrt((one.exact_untouched_v**2).mean()) * 1e-4
     assert fine.std() == pytest.approx(expected, rel=0.15)
 
 
@@ -166,7 +166,7 @@ def test_a_reciprocal_scan_copies_what_it_does_not_measure():
     assert np.array_equal(half.frames_v[..., fold.first], full.frames_v[..., fold.first])
     copies = fold.sign * full.frames_v[..., fold.first]
     assert np.array_equal(half.frames_v[..., fold.second], copies)
-    assert np.array_equal(half.quiet_v, copied(full.quiet_v, one.protocol))
+    assert np.array_equal(half.untouched_v, copied(full.untouched_v, one.protocol))
 
 
 @pytest.mark.parametrize("name", [name for name in SETS if name != "train"])
@@ -192,9 +192,9 @@ def test_sets_hold_what_they_say(name):
 def test_drift_is_in_the_frames_and_not_in_the_reference():
     drifting = session("drift")
     steady = replace(drifting, exact_v=drifting.exact_v)
-    assert np.array_equal(steady.exact_quiet_v, drifting.exact_quiet_v)
-    quiet_v = drifting.exact_quiet_v
-    assert np.ptp(drifting.exact_v @ quiet_v / (quiet_v @ quiet_v)) > 0.002
+    assert np.array_equal(steady.exact_untouched_v, drifting.exact_untouched_v)
+    untouched_v = drifting.exact_untouched_v
+    assert np.ptp(drifting.exact_v @ untouched_v / (untouched_v @ untouched_v)) > 0.002
 
 
 @pytest.mark.parametrize(

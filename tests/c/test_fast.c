@@ -19,7 +19,7 @@ typedef struct bench {
     size_t size;
     void *aligned;
     eits_fast *fast;
-    eits_real quiet[SMALL_ROWS], frame[SMALL_ROWS];
+    eits_real untouched[SMALL_ROWS], frame[SMALL_ROWS];
     double sigma, gain_drift; /* V; of all voltages */
     uint32_t now_us, next;
     uint64_t random;
@@ -30,15 +30,16 @@ typedef struct bench {
 static void tare(bench *b, eits_sign sign)
 {
     CHANGE_OPTIONS(b->skin.ctx, o.sign = sign);
-    small_reference(&b->skin.model, 1.0, b->quiet);
+    small_reference(&b->skin.model, 1.0, b->untouched);
     double square = 0;
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-        square += (double)b->quiet[i] * (double)b->quiet[i];
+        square += (double)b->untouched[i] * (double)b->untouched[i];
     b->sigma = NOISE * sqrt(square / SMALL_ROWS);
     eits_real frames[16][SMALL_ROWS];
     for (uint32_t i = 0; i < 16 * SMALL_ROWS; ++i)
         frames[i / SMALL_ROWS][i % SMALL_ROWS] =
-            (eits_real)((double)b->quiet[i % SMALL_ROWS] + b->sigma * 2 * small_random(&b->random));
+            (eits_real)((double)b->untouched[i % SMALL_ROWS] +
+                        b->sigma * 2 * small_random(&b->random));
     LEARN(b->skin.ctx, 16, frames);
     memcpy(b->frame, frames[15], sizeof b->frame);
 }
@@ -118,7 +119,7 @@ static void measure(bench *b)
     uint32_t count = 0;
     const uint16_t *rows = eits_fast_rows(b->fast, b->next, &count);
     for (uint32_t i = 0; i < count; ++i) {
-        double v = (double)b->quiet[rows[i]] * (1 + b->gain_drift);
+        double v = (double)b->untouched[rows[i]] * (1 + b->gain_drift);
         for (uint32_t k = 0; k < b->fingers; ++k)
             v += answer(b, rows[i], b->on[k]);
         b->frame[rows[i]] = (eits_real)(v + b->sigma * 2 * small_random(&b->random));
@@ -393,7 +394,7 @@ static void spoil_open(bench *b)
     for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
         const uint8_t *row = b->skin.model.protocol + 4 * i;
         if (row[2] == 3 || row[3] == 3)
-            b->frame[i] = (eits_real)(i % 2 == 0 ? 5.0 : -1.0) * b->quiet[i];
+            b->frame[i] = (eits_real)(i % 2 == 0 ? 5.0 : -1.0) * b->untouched[i];
     }
     if (b->next == 0 && b->fast->wild > 0) {
         confirm(b, (const double[][2]){{-40, 0}}, 1);
@@ -456,7 +457,8 @@ TEST(test_rows_without_sense)
     uint32_t drives_told = 0;
     for (uint32_t k = 0; k < 400; ++k) {
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-            b->frame[i] = (eits_real)((double)b->quiet[i] * (1 + 1e-2 * small_random(&b->random)));
+            b->frame[i] =
+                (eits_real)((double)b->untouched[i] * (1 + 1e-2 * small_random(&b->random)));
         give(b);
         drives_told += told(b, touches) > 0;
     }
@@ -774,7 +776,7 @@ TEST(test_what_is_refused)
     CHECK_REFUSED(eits_fast_name(NULL, &info));
     CHECK_REFUSED(eits_fast_name(b->fast, NULL));
     CHECK_REFUSED(eits_fast_begin(NULL));
-    CHECK_OK(eits_reference_set(b->skin.ctx, b->quiet, SMALL_ROWS));
+    CHECK_OK(eits_reference_set(b->skin.ctx, b->untouched, SMALL_ROWS));
     CHECK_EQUAL(eits_fast_begin(b->fast), EITS_E_NO_REFERENCE); /* of unknown noise */
     CHECK_OK(eits_reference_begin(b->skin.ctx, 4));
     CHECK_EQUAL(eits_fast_begin(b->fast), EITS_E_NO_REFERENCE); /* not yet */

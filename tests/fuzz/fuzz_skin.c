@@ -151,14 +151,14 @@ static double answer(uint32_t row)
 static void drives(void)
 {
     eits_fast_touch told[EITS_FAST_TOUCHES];
-    eits_real quiet[SMALL_ROWS], volts[EITS_FAST_ROWS];
-    small_reference(&model, 1.0, quiet);
+    eits_real untouched[SMALL_ROWS], volts[EITS_FAST_ROWS];
+    small_reference(&model, 1.0, untouched);
     for (uint32_t drive = 0; drive < eits_fast_drives(fast); ++drive) {
         uint32_t rows, count;
         const uint16_t *row = eits_fast_rows(fast, drive, &rows);
         MUST(row != NULL && rows <= EITS_FAST_ROWS);
         for (uint32_t i = 0; i < rows; ++i)
-            volts[i] = spoilt((double)quiet[row[i]] + answer(row[i]), row[i]);
+            volts[i] = spoilt((double)untouched[row[i]] + answer(row[i]), row[i]);
         MUST(eits_fast_drive(fast, drive, volts, rows, now_us) == EITS_OK);
         now_us += 1300;
         MUST(eits_fast_touches(fast, told, EITS_FAST_TOUCHES, &count) == EITS_OK);

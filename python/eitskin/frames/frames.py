@@ -90,7 +90,9 @@ class Frames:
             "reference_voltage_v", _shaped(reference, (None, channels), "reference_voltage_v")
         )
         if not len(reference):
-            raise FrameError("reference_voltage_v is empty; frames need at least one quiet frame")
+            raise FrameError(
+                "reference_voltage_v is empty; frames need at least one untouched frame"
+            )
         voltage = _shaped(_floats(self.voltage_v, "voltage_v"), (None, channels), "voltage_v")
         self._set("voltage_v", voltage)
         n = len(voltage)
@@ -195,8 +197,8 @@ class Frames:
             self._set("truth_conductivity_s_per_m", conductivity)
 
     def __repr__(self) -> str:
-        quiet = len(self.reference_voltage_v)
-        return f"<Frames {self.n_frames} of {self.protocol.n_rows} rows, {quiet} quiet>"
+        untouched = len(self.reference_voltage_v)
+        return f"<Frames {self.n_frames} of {self.protocol.n_rows} rows, {untouched} untouched>"
 
     @property
     def n_frames(self) -> int:

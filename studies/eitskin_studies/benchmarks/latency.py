@@ -32,7 +32,7 @@ from eitskin_studies.harness.sections import Filling
 ROWS, ROW_US, DRIVES_A_FRAME = 208, 100.0, 16
 RATE_HZ = 1e6 / (ROWS * ROW_US)  # scans without a pause
 RISES_MS = (0, 30, 60, 120)
-QUIET_FRAMES = 64
+UNTOUCHED_FRAMES = 64
 HELD_S = 0.25  # fully pressed; and at least from lift to contact
 LINGER_S = 0.1  # after a lift a touch may still be told for so long
 REACH_MM = 60.0  # of contacts from the centre
@@ -218,7 +218,7 @@ def _written(place: Path, name: str, presses: Sequence[Press], seed: int) -> Pat
     written = place / f"{name}.toml"
     written.write_text(
         f'[scene]\nname = "{name}"\nskin = "paper"\nseed = {seed}\nrate_hz = {RATE_HZ!r}\n'
-        f"frames = {frames}\nquiet_frames = {QUIET_FRAMES}\n{''.join(touches)}"
+        f"frames = {frames}\nquiet_frames = {UNTOUCHED_FRAMES}\n{''.join(touches)}"
         "[effects.noise]\nsnr_db = 60.0\n[effects.contact_impedance]\nspread = 0.2\n",
         encoding="utf-8",
     )
@@ -236,7 +236,7 @@ def follow(
     """What a board, "sim" or "emu", tells of ``presses``, frame by frame or drive by drive."""
     scene = _written(place, f"{board}-{len(presses)}", presses, seed)
     settings = SessionSettings(
-        mode=Stream.TOUCHES, tare=QUIET_FRAMES, model=model, every=1, report=report
+        mode=Stream.TOUCHES, tare=UNTOUCHED_FRAMES, model=model, every=1, report=report
     )
     with Session(f"{board}:{scene}", settings, observe=observe_scene) as session:
         session.start()

@@ -189,7 +189,7 @@ def test_devices_asks_only_what_looks_like_a_board(scene, done, told, monkeypatc
         monkeypatch.setattr("eitskin.device.ports.ports", lambda: found)
         listed = told("devices")
         text = done("devices")
-        quiet = done("devices --quiet")
+        unasked = done("devices --quiet")
     by_path = {port["path"]: port for port in listed["ports"]}
     assert by_path[path]["board"]["board"] == "simulated" and by_path[path]["why"] is None
     assert by_path["/dev/ttyS0"]["board"] is by_path["/dev/ttyS0"]["why"] is None
@@ -198,7 +198,7 @@ def test_devices_asks_only_what_looks_like_a_board(scene, done, told, monkeypatc
     assert set(listed["urls"]) == urls
     assert f"serial:{path}  STM32 STLink, USB 0483:374b: simulated, firmware 0.1.0" in text
     assert "serial:/dev/ttyS0: not a board" in text
-    assert quiet.count("a board, not asked") == 2
+    assert unasked.count("a board, not asked") == 2
 
 
 def test_no_port_at_all(done, monkeypatch):
@@ -312,7 +312,9 @@ def test_little_is_imported(command, names, imported):
 def test_frames_of_a_recording_give_the_boards_touches(done, told, scene, tmp_path):
     run, exported = tmp_path / "run.eits", tmp_path / "run.npz"
     done(f"record --device sim:{scene} -o {run}")
-    assert done(f"replay {run} --frames {exported}") == f"{exported}: {FRAMES} frames, 16 quiet\n"
+    assert (
+        done(f"replay {run} --frames {exported}") == f"{exported}: {FRAMES} frames, 16 untouched\n"
+    )
     frames = load_frames(exported)
     assert frames.n_frames == FRAMES and len(frames.reference_voltage_v) == 16
     assert np.allclose(frames.time_s, 0.05 * np.arange(FRAMES))

@@ -102,7 +102,7 @@ def test_what_it_says_is_what_the_reconstructor_does(told, frames_file):
     facts = told(f"reconstruct {frames_file} --iterations 25 --sign both")
     reconstructor = Reconstructor(*prebuilt()[:1], blob=prebuilt()[1])
     reconstructor.set_options(iterations=25, sign="both")
-    reconstructor.tare(session().quiet_v)
+    reconstructor.tare(session().untouched_v)
     for number in (0, 7, 19):
         reconstructor.forget()
         touches = reconstructor.reconstruct(session().frames_v[number]).touches
@@ -169,10 +169,10 @@ def test_for_people(done, frames_file):
     assert sum(line.startswith("test-s3-") for line in lines) == 20
 
 
-def test_quiet_frames_show_nothing(done, told, changed_frames):
-    quiet = session().quiet_v
+def test_untouched_frames_show_nothing(done, told, changed_frames):
+    untouched = session().untouched_v
     names = np.array([f"q{k}" for k in range(8)])
-    given = {"voltage_v": quiet[:8], "reference_voltage_v": quiet[8:], "frame_name": names}
+    given = {"voltage_v": untouched[:8], "reference_voltage_v": untouched[8:], "frame_name": names}
     path = changed_frames(truth=False, **given)
     text = done(f"reconstruct {path}")
     assert text.count("none (no change above the noise)") >= 7
@@ -213,7 +213,7 @@ def test_a_bad_frame_among_good_ones(changed_frames, tmp_path, ran):
 def test_a_reference_of_another_skin_is_warned_of(changed_frames, ran):
     order = np.random.default_rng(1).permutation(208)
     path = changed_frames(
-        voltage_v=session().frames_v[:, order], reference_voltage_v=session().quiet_v[:, order]
+        voltage_v=session().frames_v[:, order], reference_voltage_v=session().untouched_v[:, order]
     )
     err = ran(0, f"reconstruct {path}")[1]
     assert err.startswith("eitskin: warning: the reference correlates with the model only by 0.")

@@ -161,12 +161,12 @@ def test_frames_that_cannot_be_used(voltage, text, engine, tmp_path, changed_fra
     ],
 )
 def test_references_that_cannot_be_used(value, text, refused, changed_frames, tmp_path):
-    quiet = session().quiet_v.copy()
+    untouched = session().untouched_v.copy()
     if value:
-        quiet[7, 20] = value
+        untouched[7, 20] = value
     else:
-        quiet[:] = 0
-    path = changed_frames(first=1, reference_voltage_v=quiet)
+        untouched[:] = 0
+    path = changed_frames(first=1, reference_voltage_v=untouched)
     line = refused(FRAME, f"reconstruct {path} -o {tmp_path / 'out.npz'}")
     assert text in line and line.endswith(f"run  eitskin doctor {path}")
 

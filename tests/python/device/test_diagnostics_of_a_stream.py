@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from device_helpers import QUIET, Damaging, empty_bank, of, same, scene, sim_device
+from device_helpers import UNTOUCHED, Damaging, empty_bank, of, same, scene, sim_device
 
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.device.bank import bank_bytes
@@ -56,7 +56,7 @@ def faults(items: Iterable[object]) -> list[tuple[int, bool, int, int]]:
 @pytest.mark.parametrize("every", [1, 4])
 def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_it_is_back(every):
     with sim_device(board()) as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         device.start_scene()
         items = list(device.stream(Stream.TOUCHES, every=every))
         assert device.info().faults == 0
@@ -80,7 +80,7 @@ def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_i
 
 def test_it_is_told_though_nobody_wants_images():
     with sim_device(board()) as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         device.start_scene()
         told = faults(device.stream(Stream.RAW))
     found = [fault[:3] for fault in told]
@@ -90,7 +90,7 @@ def test_it_is_told_though_nobody_wants_images():
 def test_what_is_not_looked_for_is_not_found():
     opened = bits("electrode open")
     with sim_device(board()) as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         options = board_options(prebuilt()[0], device.board)
         device.solver(replace(options, diagnostics=ALL_DIAGNOSTICS & ~opened))
         device.start_scene()
@@ -105,7 +105,7 @@ def test_the_check_finds_what_the_board_found(tmp_path):
         options = board_options(prebuilt()[0], device.board)
         device.solver(options)
         with Recorder(path, device, options):
-            take_reference(device, QUIET, streamed=True)
+            take_reference(device, UNTOUCHED, streamed=True)
             device.start_scene()
             live = of(Frame, read_frames(device, ALL))
     assert (OFF,) in {frame.info.open_electrodes for frame in live if frame.info is not None}
@@ -126,7 +126,7 @@ def test_the_check_tells_findings_apart(tmp_path):
     path, hiding = tmp_path / "run.eits", Damaging(SimTransport("hides", board()), same, hide)
     with Device(hiding) as device, Recorder(path, device):
         device.solver(board_options(prebuilt()[0]))
-        take_reference(device, QUIET, streamed=True)
+        take_reference(device, UNTOUCHED, streamed=True)
         device.start_scene()
         list(read_frames(device, ALL))
     check, _ = check_recording(path, None)

@@ -338,8 +338,8 @@ def test_the_example_of_a_source_is_one(monkeypatch):
         assert (device.board.board, device.board.frame_period_us) == ("breathing", 2000)
         device.tare(8)
         raw = list(device.stream(Stream.RAW, frames=3))
-    quiet = prebuilt()[0].golden.reference_v
-    assert np.allclose(np.abs(raw[0].voltage_v), np.abs(quiet), rtol=2e-3)
+    untouched = prebuilt()[0].golden.reference_v
+    assert np.allclose(np.abs(raw[0].voltage_v), np.abs(untouched), rtol=2e-3)
     for url, said in (
         ("breathing:fast", "write frames a second"),
         ("broken:1", "own_source:absent failed"),

@@ -62,16 +62,16 @@ def test_a_drive_has_the_hosts_bits_and_a_bounded_cost(cortex_m7, tmp_path, name
     rng = np.random.default_rng(9)
     v0 = model.golden.reference_v.astype(np.float64)
     sigma = 1e-3 * float(np.sqrt(np.mean(v0**2)))
-    quiet = (v0 + sigma * rng.standard_normal((16, len(v0)))).astype(np.float32)
+    untouched = (v0 + sigma * rng.standard_normal((16, len(v0)))).astype(np.float32)
     scans = scans_of(name, v0, rng).astype(np.float32)
     board: EmulatedRun = run_steps(
         cortex_m7 / PROGRAM,
         tmp_path,
-        (Load(blob), Choose(default_options(model)), TareStep(quiet), Drives(scans, STEP)),
+        (Load(blob), Choose(default_options(model)), TareStep(untouched), Drives(scans, STEP)),
     )
     engine = CoreEngine(blob)
     engine.set_options(default_options(model))
-    engine.set_reference(quiet.astype(np.float64))
+    engine.set_reference(untouched.astype(np.float64))
     fast = FastCore(engine)
     fast.begin()
     assert fast.bytes >= board.fast_bytes > 16_000  # pointers are smaller there

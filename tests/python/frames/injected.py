@@ -13,7 +13,7 @@ from eitskin.skin.skin import Skin, paper_skin
 
 FloatArray = NDArray[np.float64]
 
-QUIET = 12
+UNTOUCHED = 12
 GAIN = 0.02
 SNR_DB = 60.0
 TOUCHES_MM = ((30.0, 40.0), (-50.0, 10.0))
@@ -28,9 +28,9 @@ def healthy_frames(
     snr_db: float = SNR_DB,
     touches_mm: tuple[tuple[float, float], ...] = TOUCHES_MM,
     transfer_ohm: FloatArray | None = None,
-    quiet: int = QUIET,
+    untouched: int = UNTOUCHED,
 ) -> Frames:
-    """Quiet frames and one frame with touches that change its voltages by at most 5 %.
+    """Untouched frames and one frame with touches that change its voltages by at most 5 %.
 
     Every channel has a gain of its own (standard deviation ``gain``) and noise at ``snr_db``.
     """
@@ -50,7 +50,7 @@ def healthy_frames(
     return Frames(
         protocol=protocol,
         voltage_v=(gains * (clean + change) + sigma * rng.normal(size=len(rows)))[None],
-        reference_voltage_v=gains * clean + sigma * rng.normal(size=(quiet, len(rows))),
+        reference_voltage_v=gains * clean + sigma * rng.normal(size=(untouched, len(rows))),
         touch_frame=np.zeros(len(centres), dtype=np.int64),
         touch_xy_mm=centres,
         touch_radius_mm=radii,
@@ -97,10 +97,10 @@ def as_if_electrodes(
     return changed(frames, physical.reference_voltage_v, physical.voltage_v)
 
 
-def quiet_only(frames: Frames) -> Frames:
+def untouched_only(frames: Frames) -> Frames:
     """The same voltages without any known touch."""
-    volts, quiet = frames.voltage_v, frames.reference_voltage_v
-    return Frames(frames.protocol, volts, quiet, allow_nonfinite=True)
+    volts, untouched = frames.voltage_v, frames.reference_voltage_v
+    return Frames(frames.protocol, volts, untouched, allow_nonfinite=True)
 
 
 def rotating(frames: Frames) -> Frames:

@@ -13,10 +13,10 @@ from injected import (
     dead,
     healthy_frames,
     pair_off,
-    quiet_only,
     reversed_sign,
     rotating,
     times,
+    untouched_only,
     wired,
 )
 
@@ -135,19 +135,19 @@ def test_import_says_what_it_wrote(tmp_path, capsys):
 
 def test_the_doctor_examines_frames_files_and_prints_evidence(tmp_path, capsys):
     path = tmp_path / "f.npz"
-    save_frames(path, rotating(quiet_only(healthy_frames(15))))
+    save_frames(path, rotating(untouched_only(healthy_frames(15))))
     assert run("doctor", path) == 11
     text = capsys.readouterr().out
     assert "FAULT order" in text
     assert "rotating 0.9" in text
     assert "repair: eitskin import ... --order rotating" in text
-    save_frames(path, quiet_only(healthy_frames(15, opposite(16))))
+    save_frames(path, untouched_only(healthy_frames(15, opposite(16))))
     assert run("doctor", path) == 0
     assert "0 faults, 0 notes: nothing must be repaired" in capsys.readouterr().out
 
 
 def test_sources_with_all_pairs_are_recognised_by_their_number(tmp_path, capsys):
-    frames = quiet_only(healthy_frames(16))
+    frames = untouched_only(healthy_frames(16))
     rows = source_table("rotating-all", frames.protocol)
     values = np.full((len(rows), 2), 0.5)
     measured = ~(rows[:, :2, None] == rows[:, None, 2:]).any(axis=(1, 2))
@@ -163,7 +163,7 @@ def test_sources_with_all_pairs_are_recognised_by_their_number(tmp_path, capsys)
 
 def test_the_picture_is_drawn(tmp_path):
     path = tmp_path / "f.npz"
-    save_frames(path, dead(quiet_only(healthy_frames(17)), 3))
+    save_frames(path, dead(untouched_only(healthy_frames(17)), 3))
     assert run("doctor", path, "--picture", tmp_path / "p.png") == 11
     assert (tmp_path / "p.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     with pytest.raises(EitskinError, match=r"is not a format of a picture; use \.png"):

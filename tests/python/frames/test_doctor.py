@@ -18,10 +18,10 @@ from injected import (
     channels_off,
     healthy_frames,
     pair_off,
-    quiet_only,
     reversed_sign,
     rotating,
     times,
+    untouched_only,
     wired,
 )
 
@@ -108,10 +108,10 @@ def test_finite_element_frames_with_uneven_contacts_raise_no_alarm():
         clean = ForwardModel(mesh, PAPER, adjacent(16), 0.01 * rng.uniform(0.8, 1.2, 16)).voltages(
             0.01
         )
-        quiet = clean * (1 + 0.02 * rng.normal(size=208)) + 1e-3 * np.std(clean) * rng.normal(
+        untouched = clean * (1 + 0.02 * rng.normal(size=208)) + 1e-3 * np.std(clean) * rng.normal(
             size=(8, 208)
         )
-        assert named(report_of(Frames(adjacent(16), quiet[:1], quiet))) == []
+        assert named(report_of(Frames(adjacent(16), untouched[:1], untouched))) == []
 
 
 @by_protocol
@@ -136,7 +136,7 @@ def test_reversed_polarity_is_certain_once_a_channel_crosses_zero():
     frames = healthy_frames(4)
     voltage = -frames.voltage_v.copy()
     voltage[0, 6] = -0.2 * rms(frames)
-    crossing = quiet_only(changed(frames, -frames.reference_voltage_v, voltage))
+    crossing = untouched_only(changed(frames, -frames.reference_voltage_v, voltage))
     assert only(crossing, "reversed").repair == "--sign reversed"
 
 
@@ -167,7 +167,7 @@ def test_numbering_is_told_by_two_known_touches(rotate, mirror, option):
 
 def test_numbering_of_a_symmetric_skin_is_declared_untold_without_a_touch():
     frames = as_if_electrodes(healthy_frames(6), electrode_map(16, 5, True), seed=6)
-    known, unknown_places = report_of(quiet_only(frames)), report_of(frames, None)
+    known, unknown_places = report_of(untouched_only(frames)), report_of(frames, None)
     assert named(known) == []
     for report, option in ((known, "--touch X,Y"), (unknown_places, "--skin")):
         told = [text for text in report.untold if "in which direction the numbers run" in text]
@@ -180,7 +180,7 @@ def test_one_touch_leaves_its_mirror_image_and_says_so():
     assert any("fits as given, but --mirror too" in text for text in report.untold)
 
 
-def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame():
+def test_numbering_of_an_odd_outline_is_told_by_the_untouched_frame():
     corners = [(-60.0, -40.0), (70.0, -40.0), (70.0, 30.0), (10.0, 60.0), (-60.0, 40.0)]
     skin = Skin("odd", polygon(corners), Electrodes(count=8))
     transfer = homogeneous(skin, 8).transfer_ohm
@@ -188,7 +188,7 @@ def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame():
     def numbered(moved: FloatArray) -> Frames:
         there = transfer[np.ix_(moved, moved)]
         made = healthy_frames(8, adjacent(8), skin_for(adjacent(8)), transfer_ohm=there)
-        return quiet_only(made)
+        return untouched_only(made)
 
     assert named(report_of(numbered(np.arange(8)), skin)) == []
     for rotate, mirror, option in ((3, False, "--rotate 3"), (1, True, "--rotate 1 --mirror")):
@@ -223,7 +223,7 @@ def test_joined_electrodes_are_named_whatever_their_width(width_mm, known):
     for i, j in combinations(range(16), 2):
         if i not in (0, 5):
             continue
-        joined = quiet_only(healthy_frames(16 * i + j, transfer_ohm=shorted(transfer, i, j)))
+        joined = untouched_only(healthy_frames(16 * i + j, transfer_ohm=shorted(transfer, i, j)))
         finding = only(joined, "shorted-electrodes", skin=PAPER if known else None)
         assert finding.evidence["electrodes"] == [i, j] and finding.repair == ""
 
@@ -257,12 +257,13 @@ def test_every_dead_electrode_is_named_with_its_side(driving, measuring):
 
 
 def test_an_electrode_lost_in_a_frame_is_named():
-    frames = quiet_only(healthy_frames(11))
+    frames = untouched_only(healthy_frames(11))
     voltage = frames.voltage_v.copy()
     voltage[:, (ROWS[:, :2] == 7).any(axis=1)] *= 1e-3
     finding = only(changed(frames, frames.reference_voltage_v, voltage), "electrode-lost")
     assert finding.evidence["electrode"] == 7 and finding.evidence["frames"] == [0]
-    # and beside a channel of it that is dead in the quiet frames too, so that no part of it is left
+    # and beside a channel of it that is dead in the untouched frames too, so that no part of it is
+    # left
     dead = int(np.flatnonzero((ROWS[:, :2] == 7).any(axis=1))[3])
     reference = frames.reference_voltage_v.copy()
     reference[:, dead] = voltage[:, dead] = 0
@@ -303,7 +304,7 @@ def test_noise_of_its_own_and_none_are_named(channels, noise, name, repair):
 
 @pytest.mark.parametrize(("snr_db", "severity"), [(40.0, "note"), (20.0, "fault")])
 def test_the_snr_is_measured_and_judged(snr_db, severity):
-    report = report_of(quiet_only(healthy_frames(14, snr_db=snr_db, quiet=60, gain=0.0)))
+    report = report_of(untouched_only(healthy_frames(14, snr_db=snr_db, untouched=60, gain=0.0)))
     assert named(report) == [("snr", severity)]
     assert report.measured["snr_db"] == pytest.approx(snr_db, abs=0.5)
 
@@ -353,16 +354,16 @@ def test_values_that_are_no_numbers_are_counted_and_named():
     frames = healthy_frames(19)
     reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
     reference[3, 13], voltage[0, 100] = np.nan, np.inf
-    finding = only(quiet_only(changed(frames, reference, voltage)), "not-finite")
+    finding = only(untouched_only(changed(frames, reference, voltage)), "not-finite")
     assert finding.evidence == {"channels": [13, 100], "frames": ["0"], "quiet_frames": [3]}
 
 
 def test_frames_that_cannot_be_examined_say_only_that():
     frames, rng = healthy_frames(20), np.random.default_rng(20)
     only(times(frames, np.float64(0)), "no-signal")
-    noise = changed(quiet_only(frames), np.abs(rng.normal(size=208))[None], np.zeros((0, 208)))
+    noise = changed(untouched_only(frames), np.abs(rng.normal(size=208))[None], np.zeros((0, 208)))
     assert "unlike-a-homogeneous-skin" in dict(named(report_of(noise)))
-    imaginary = quiet_only(changed(frames, frames.reference_voltage_v, -0.4 * frames.voltage_v))
+    imaginary = untouched_only(changed(frames, frames.reference_voltage_v, -0.4 * frames.voltage_v))
     finding = only(imaginary, "frames-unlike-the-reference")
     assert finding.evidence["frames"] == ["0"] and "--complex-part" in finding.text
 
@@ -372,10 +373,12 @@ def test_a_wrong_unit_is_noted():
     assert finding.evidence["reference_per_predicted"] == pytest.approx(1000, rel=0.05)
 
 
-def test_one_quiet_frame_leaves_noise_untold():
-    report = report_of(healthy_frames(22, quiet=1))
+def test_one_untouched_frame_leaves_noise_untold():
+    report = report_of(healthy_frames(22, untouched=1))
     assert named(report) == [] and "snr_db" not in report.measured
-    assert any(text.startswith("noise, SNR and drift: 1 quiet frame(s)") for text in report.untold)
+    assert any(
+        text.startswith("noise, SNR and drift: 1 untouched frame(s)") for text in report.untold
+    )
 
 
 def stuck(frames: Frames, channels: list[int]) -> Frames:

@@ -93,7 +93,7 @@ def test_one_reference_frame_becomes_a_row_and_names_are_counted():
         ({"voltage_v": np.zeros((3, CHANNELS), dtype=complex)},
          "must be real numbers, not complex128"),
         ({"voltage_v": np.full((3, CHANNELS), np.inf)}, "frame 0, channel 0 is inf"),
-        ({"reference_voltage_v": np.zeros((0, CHANNELS))}, "at least one quiet frame"),
+        ({"reference_voltage_v": np.zeros((0, CHANNELS))}, "at least one untouched frame"),
         ({"frame_name": ("a",)}, "1 names for 3 frames"),
         ({"time_s": np.zeros(2)}, "time_s has shape"),
         ({"row_time_s": np.zeros(2)}, "row_time_s has shape"),

@@ -44,7 +44,7 @@ def test_touches_carry_the_load_of_strength_and_place(engine):
     skin, bare = Reconstructor(model, engine=engine), Reconstructor(prebuilt()[0], engine=engine)
     seen = 0
     for one in (skin, bare):
-        one.tare(session().quiet_v)
+        one.tare(session().untouched_v)
     for frame in session().frames_v[:6]:
         touches, without = skin.reconstruct(frame).touches, bare.reconstruct(frame).touches
         forces = [touch.force_n for touch in touches]

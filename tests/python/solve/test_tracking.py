@@ -24,8 +24,8 @@ FRAMES = 24
 
 @cache
 def stream() -> tuple[np.ndarray, np.ndarray]:
-    """Quiet frames and a stream at 40 dB: a finger that stays, one that moves and is lifted, one
-    that comes."""
+    """Untouched frames and a stream at 40 dB: a finger that stays, one that moves and is lifted,
+    one that comes."""
     scenes = []
     for k in range(FRAMES):
         touches = [Put(-40.0, 10.0, 9.0, 5.0)]
@@ -36,7 +36,7 @@ def stream() -> tuple[np.ndarray, np.ndarray]:
         scenes.append(TouchScene(str(k), tuple(touches)))
     drawn = TouchSet("stream", 5, tuple(scenes))
     made = simulate(paper_skin(), adjacent(16), drawn, measurement=Measurement(snr_db=40.0))
-    return made.quiet_v, made.frames_v
+    return made.untouched_v, made.frames_v
 
 
 def options(**changes: object) -> Options:
@@ -45,9 +45,9 @@ def options(**changes: object) -> Options:
 
 def told(chosen: Options) -> list[tuple[Touch, ...]]:
     """Of each frame, by the C core in double."""
-    quiet_v, frames_v = stream()
+    untouched_v, frames_v = stream()
     made = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1], options=chosen)
-    made.tare(quiet_v)
+    made.tare(untouched_v)
     return [made.reconstruct(frame).touches for frame in frames_v]
 
 
@@ -102,10 +102,10 @@ def place(touch: Touch) -> tuple[float, float]:
 
 def test_what_went_before_changes_nothing():
     """An untouched skin before the stream: no report, then the same ids and places."""
-    quiet_v, frames_v = stream()
+    untouched_v, frames_v = stream()
     made = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1], options=options())
-    made.tare(quiet_v)
-    assert not any(made.reconstruct(frame).touches for frame in quiet_v[:12])
+    made.tare(untouched_v)
+    assert not any(made.reconstruct(frame).touches for frame in untouched_v[:12])
     after = [made.reconstruct(frame).touches for frame in frames_v]
     assert after == told(options())
 
@@ -138,10 +138,10 @@ def test_what_a_board_sets_is_what_python_sets():
 
 def test_each_frame_by_itself_is_as_it_was():
     """Off by default: touches and places are those of a core that forgets before every frame."""
-    quiet_v, frames_v = stream()
+    untouched_v, frames_v = stream()
     made = [Reconstructor(prebuilt()[0], blob=prebuilt()[1]) for _ in range(2)]
     for one in made:
-        one.tare(quiet_v)
+        one.tare(untouched_v)
     for frame in frames_v:
         made[1].forget()
         followed, fresh = (one.reconstruct(frame).touches for one in made)

@@ -13,18 +13,18 @@ from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 MIN_TIES = 4
 TIES_PER_USUAL = 4.0
 SAME = 1e-9
-MIN_QUIET = 4
+MIN_UNTOUCHED = 4
 
 
 def check_clipping(case: Case) -> tuple[Case, CheckOutcome]:
     """Name rows that stand at a rail, in untouched or other frames, and rows that are stuck."""
     frames = np.vstack([case.frames.reference_voltage_v, case.frames.voltage_v])
     railed = at_rail(np.where(np.isfinite(frames), frames, 0.0))
-    quiet = len(case.frames.reference_voltage_v)
+    untouched = len(case.frames.reference_voltage_v)
     findings, trusted = [], case.trusted
     channels = np.flatnonzero(railed.any(axis=0))
     if len(channels):
-        names = [case.frames.frame_name[k] for k in np.flatnonzero(railed[quiet:].any(axis=1))]
+        names = [case.frames.frame_name[k] for k in np.flatnonzero(railed[untouched:].any(axis=1))]
         levels = sorted({float(value) for value in frames[railed]})
         text = f"{len(channels)} channel(s) stand at a rail: lower the gain or the current"
         one_rail = levels[-1] - levels[0] < 1e-6
@@ -32,18 +32,18 @@ def check_clipping(case: Case) -> tuple[Case, CheckOutcome]:
             "channels": numbers(channels),
             "rail_v": levels[:1] if one_rail else [levels[0], levels[-1]],
             "readings": int(railed.sum()),
-            "in_quiet_frames": int(railed[:quiet].sum()),
+            "in_quiet_frames": int(railed[:untouched].sum()),
             "frames": names,
         }
         remedy = channel_remedy(case, channels)
         findings.append(Finding("saturated", FAULT, text, evidence, remedy))
-        trusted = trusted & ~railed[:quiet].any(axis=0)
+        trusted = trusted & ~railed[:untouched].any(axis=0)
     stuck = _stuck(case.frames.reference_voltage_v) & ~railed.any(axis=0)
     if stuck.any():
         found = numbers(np.flatnonzero(stuck))
         text = (
-            f"{len(found)} channel(s) read exactly the same in all {quiet} quiet frames while"
-            " others vary"
+            f"{len(found)} channel(s) read exactly the same in all {untouched} untouched frames"
+            " while others vary"
         )
         remedy = channel_remedy(case, found)
         findings.append(Finding("stuck", FAULT, text, {"channels": found}, remedy))
@@ -80,10 +80,10 @@ def at_rail(frames: FloatArray) -> BoolArray:
     return found
 
 
-def _stuck(quiet: FloatArray) -> BoolArray:
-    """Return the rows (m,) that do not change over at least MIN_QUIET untouched frames, provided
-    that most rows do change."""
-    if len(quiet) < MIN_QUIET:
-        return np.zeros(quiet.shape[1], dtype=bool)
-    still = np.ptp(np.nan_to_num(quiet), axis=0) == 0
+def _stuck(untouched: FloatArray) -> BoolArray:
+    """Return the rows (m,) that do not change over at least MIN_UNTOUCHED untouched frames,
+    provided that most rows do change."""
+    if len(untouched) < MIN_UNTOUCHED:
+        return np.zeros(untouched.shape[1], dtype=bool)
+    still = np.ptp(np.nan_to_num(untouched), axis=0) == 0
     return still if still.mean() < 0.5 else np.zeros_like(still)

@@ -89,7 +89,7 @@ def _report(subject: Subject, case: Case, outcomes: list[CheckOutcome]) -> Docto
     frames = case.frames
     described = (
         f"{frames.n_frames} frame(s) of {len(case.rows)} channels,"
-        f" {len(frames.reference_voltage_v)} quiet, {frames.protocol.n_electrodes} electrodes;"
+        f" {len(frames.reference_voltage_v)} untouched, {frames.protocol.n_electrodes} electrodes;"
         f" compared with {case.prediction.source}"
     )
     measured: dict[str, object] = {}

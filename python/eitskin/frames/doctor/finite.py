@@ -12,23 +12,23 @@ from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 def check_finite(case: Case) -> tuple[Case, CheckOutcome]:
     """Report NaN and Inf by row and frame, and a reference that is zero everywhere; affected rows
     lose their trust."""
-    quiet, frames = case.frames.reference_voltage_v, case.frames.voltage_v
-    bad_quiet, bad = ~np.isfinite(quiet), ~np.isfinite(frames)
-    channels = np.flatnonzero(bad_quiet.any(axis=0) | bad.any(axis=0))
+    untouched, frames = case.frames.reference_voltage_v, case.frames.voltage_v
+    bad_untouched, bad = ~np.isfinite(untouched), ~np.isfinite(frames)
+    channels = np.flatnonzero(bad_untouched.any(axis=0) | bad.any(axis=0))
     findings = []
     if len(channels):
         names = [case.frames.frame_name[k] for k in np.flatnonzero(bad.any(axis=1))]
-        count = int(bad_quiet.sum() + bad.sum())
+        count = int(bad_untouched.sum() + bad.sum())
         text = f"{count} voltages are NaN or Inf, in {len(channels)} channel(s)"
         evidence = {
             "channels": numbers(channels),
             "frames": names,
-            "quiet_frames": numbers(np.flatnonzero(bad_quiet.any(axis=1))),
+            "quiet_frames": numbers(np.flatnonzero(bad_untouched.any(axis=1))),
         }
         few = len(channels) <= len(case.rows) // 4
         remedy = channel_remedy(case, channels) if few else ""
         findings.append(Finding("not-finite", FAULT, text, evidence, remedy))
-    trusted = case.trusted & ~bad_quiet.any(axis=0)
+    trusted = case.trusted & ~bad_untouched.any(axis=0)
     if rms(case.reference[trusted]) == 0:
         text = "the reference frame is zero everywhere: no current, or a wrong array"
         findings.append(Finding("no-signal", FAULT, text))

@@ -172,10 +172,10 @@ def _whole_pairs(case: Case, wrong: np.ndarray[Any, Any], columns: tuple[int, in
 
 def _times(case: Case, sign: FloatArray | float, magnitude: bool = False) -> Case:
     """Return ``case`` with its voltages, or their magnitudes, multiplied by ``sign`` (m,)."""
-    quiet, voltage = case.frames.reference_voltage_v, case.frames.voltage_v
+    untouched, voltage = case.frames.reference_voltage_v, case.frames.voltage_v
     if magnitude:
-        quiet, voltage = np.abs(quiet), np.abs(voltage)
-    frames = replace(case.frames, voltage_v=voltage * sign, reference_voltage_v=quiet * sign)
+        untouched, voltage = np.abs(untouched), np.abs(voltage)
+    frames = replace(case.frames, voltage_v=voltage * sign, reference_voltage_v=untouched * sign)
     return replace(case, frames=frames, magnitude=case.magnitude or magnitude)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.frames.doctor.case import Case, cosine, rms
-from eitskin.frames.doctor.noise import MIN_QUIET, channel_noise
+from eitskin.frames.doctor.noise import MIN_UNTOUCHED, channel_noise
 from eitskin.frames.doctor.numbering import Numbering, ranked, renumbered_frames
 from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 from eitskin.frames.homogeneous import touch_transfer
@@ -109,8 +109,8 @@ def _also(given: Numbering, rivals: list[Numbering]) -> tuple[str, ...]:
 def _drowned(case: Case, measured: list[FloatArray], weight: FloatArray) -> bool:
     """Return whether the weighted changes are below AUDIBLE times the weighted noise of one frame;
     False if the noise is unknown."""
-    quiet = case.frames.reference_voltage_v
-    if len(quiet) < MIN_QUIET:
+    untouched = case.frames.reference_voltage_v
+    if len(untouched) < MIN_UNTOUCHED:
         return False
-    noise = rms((np.nan_to_num(channel_noise(quiet)) * weight)[case.trusted])
+    noise = rms((np.nan_to_num(channel_noise(untouched)) * weight)[case.trusted])
     return rms(np.array([(change * weight)[case.trusted] for change in measured])) < AUDIBLE * noise

@@ -69,17 +69,17 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             judged[name, snr] = anywhere.Anywhere.from_dict(
                 workspace.kept(facts, partial(_as_dict, scored))
             )
-    reps, quiet = settings.count(30, 4), settings.count(4000, 80)
+    reps, untouched = settings.count(30, 4), settings.count(4000, 80)
     found = []
     for snr in workspace.progress(detection.SNRS_DB, "light presses"):
         facts = {
             "part": "detection",
             "snr_db": snr,
             "reps": reps,
-            "quiet": quiet,
+            "quiet": untouched,
             "set": light.facts,
         }
-        look = partial(detection.detect, instruments, light, snr, reps, quiet)
+        look = partial(detection.detect, instruments, light, snr, reps, untouched)
         found.append(
             detection.Detection.from_dict(
                 workspace.kept(facts, lambda look=look: look().as_dict())  # type: ignore[misc]

@@ -1,4 +1,4 @@
-"""The smallest load that is detected, over SNR and radius; and how often a quiet frame shows a
+"""The smallest load that is detected, over SNR and radius; and how often an untouched frame shows a
 touch that is none."""
 
 from dataclasses import dataclass
@@ -18,21 +18,21 @@ from eitskin_studies.harness.snr import noise_deviation_v
 SNRS_DB = (30.0, 40.0, 50.0, 60.0, 70.0, 80.0)
 PROBABILITY = 0.9
 NEAR_MM = 10.0
-TARES, QUIET = 8, 64
+TARES, UNTOUCHED = 8, 64
 RESAMPLES = 400
 
 
 @dataclass(frozen=True, eq=False)
 class Detection:
     """At one SNR: ``hits`` of ``tries``, both (radii, loads), presses of ``loads_g`` (loads,);
-    ``false`` of ``quiet`` frames."""
+    ``false`` of ``untouched`` frames."""
 
     snr_db: float
     loads_g: FloatArray
     hits: FloatArray
     tries: FloatArray
     false: int
-    quiet: int
+    untouched: int
 
     @classmethod
     def from_dict(cls, facts: dict[str, Any]) -> "Detection":
@@ -71,16 +71,16 @@ class Detection:
         return f"{grams_text(load)} g ({grams_text(low)} to {grams_text(high)})"
 
     def false_share(self) -> tuple[float, float]:
-        """False alarms a quiet frame, and the upper 95 % bound (Clopper and Pearson, Biometrika 26,
-        1934)."""
+        """False alarms an untouched frame, and the upper 95 % bound (Clopper and Pearson,
+        Biometrika 26, 1934)."""
         from scipy.stats import beta
 
         upper = (
             1.0
-            if self.false == self.quiet
-            else float(beta.ppf(0.95, self.false + 1, self.quiet - self.false))
+            if self.false == self.untouched
+            else float(beta.ppf(0.95, self.false + 1, self.untouched - self.false))
         )
-        return self.false / self.quiet, upper
+        return self.false / self.untouched, upper
 
 
 def least_load(loads_g: FloatArray, share: FloatArray) -> float:
@@ -104,10 +104,10 @@ def detect(
     quiet_frames: int,
     mean_of: int = 1,
 ) -> Detection:
-    """``reps`` frames of each press; quiet frames after several tares. With ``mean_of`` each frame,
-    also of the tare, is the mean of so many."""
+    """``reps`` frames of each press; untouched frames after several tares. With ``mean_of`` each
+    frame, also of the tare, is the mean of so many."""
     session, seed = light.session, light.session.touches.seed
-    how, exact = converter_for(snr_db), session.exact_quiet_v
+    how, exact = converter_for(snr_db), session.exact_untouched_v
     span_v = how.adc_headroom * float(np.abs(exact).max())
     lsb_v = 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits
     converter = noise_deviation_v(exact, snr_db), lsb_v, span_v, seed
@@ -118,8 +118,8 @@ def detect(
 
     false, looked, each = 0, 0, -(-quiet_frames // TARES)
     for tare in range(TARES):
-        quiet = measured(np.tile(exact, (QUIET, 1)), f"force tare {tare} {snr_db:g}")
-        batch = instruments.batch("difference", quiet)
+        untouched = measured(np.tile(exact, (UNTOUCHED, 1)), f"force tare {tare} {snr_db:g}")
+        batch = instruments.batch("difference", untouched)
         still = measured(np.tile(exact, (each, 1)), f"force still {tare} {snr_db:g}")
         results = list(batch.each(still))
         false += sum(isinstance(r, Reconstruction) and len(r.touches) > 0 for r in results)
@@ -156,7 +156,7 @@ def table_of(found: list[Detection]) -> Table:
             (
                 f"{one.snr_db:g} dB",
                 *cells,
-                f"{one.false} of {one.quiet}",
+                f"{one.false} of {one.untouched}",
                 f"{100 * upper:.2f} %" if share < 1 else "all",
             )
         )

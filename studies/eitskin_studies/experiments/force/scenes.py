@@ -92,7 +92,7 @@ def solved(
         solver.skin.conductivity_s_per_m,
         whole,
         np.concatenate(volts),
-        part.exact_quiet_v,
+        part.exact_untouched_v,
     )
     grams, places, law, group = zip(*rows, strict=True)
     return PressSet(session, np.array(grams), np.array(places), np.array(law), np.array(group))

@@ -73,7 +73,7 @@ class UnderSheet:
                 ]
                 alarms = [
                     f"{self.least[contact, snr, mean_of].false} of"
-                    f" {self.least[contact, snr, mean_of].quiet}"
+                    f" {self.least[contact, snr, mean_of].untouched}"
                     for contact in ("sheet", "tip")
                 ]
                 rows.append((f"{snr:g} dB", what, *cells, "; ".join(alarms)))
@@ -121,14 +121,14 @@ def measured(
     least: dict[tuple[str, float, int], Detection] = {
         ("tip", one.snr_db, 1): one for one in tip_single
     }
-    reps, quiet = settings.count(30, 4), settings.count(4000, 80)
+    reps, untouched = settings.count(30, 4), settings.count(4000, 80)
     wanted = [(snr, mean_of) for snr in SNRS_DB for mean_of in (1, SECOND)]
     wanted += [(SNRS_DB[-1], mean_of) for mean_of in MEANS[1:-1]]
     for snr, mean_of in workspace.progress(wanted, "weights on a sheet"):
         for contact, presses in (("sheet", light), ("tip", tip)):
             if (contact, snr, mean_of) in least:
                 continue
-            still = quiet if mean_of == 1 else max(80, quiet // 8)
+            still = untouched if mean_of == 1 else max(80, untouched // 8)
             what = {"part": "mean", "mean_of": mean_of, "reps": reps, "quiet": still}
             look = partial(detect, instruments, presses, snr, reps, still, mean_of)
             one = workspace.kept(
