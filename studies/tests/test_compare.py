@@ -198,15 +198,15 @@ def test_noise_free_frames_do_no_worse(comparison):
 
 
 def test_progress_is_told_all_work():
-    told: list[tuple[str, int]] = []
+    reported: list[tuple[str, int]] = []
 
     def watch(items: Sequence[object], what: str) -> Sequence[object]:
-        told.append((what, len(items)))
+        reported.append((what, len(items)))
         return items
 
     few = replace(SMALL, scenes=2, train_scenes=1)
     compare(SKIN, PROTOCOL, few, families=quick, progress=watch)
-    assert told == [("simulating (train)", 1), ("simulating (test)", 2), ("reconstructing", 2)]
+    assert reported == [("simulating (train)", 1), ("simulating (test)", 2), ("reconstructing", 2)]
 
 
 def test_impossible_settings_are_refused():

@@ -52,12 +52,12 @@ def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(done):
 
 
 def test_calibrated_touches_read_one_load_alike(done):
-    told = {
+    errors = {
         (one["reading"], one["snr_db"]): anywhere.Anywhere.from_dict(one)
         for one in done[1].data["anywhere"]
     }
-    assert set(told) == {(name, snr) for name in READOUTS for snr in force.SNRS_DB}
-    touch, peak = told[TOUCH, 72.0], told[PEAK, 72.0]
+    assert set(errors) == {(name, snr) for name in READOUTS for snr in force.SNRS_DB}
+    touch, peak = errors[TOUCH, 72.0], errors[PEAK, 72.0]
     assert touch.found == 1 and touch.calibrated.shape == (8, len(LOADS_G)) and touch.macs > 1e5
     assert anywhere.scatter(touch.calibrated) < 0.1 < 0.2 < anywhere.scatter(peak.raw)
 

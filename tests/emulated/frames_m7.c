@@ -244,10 +244,10 @@ static int solve_one(unsigned k, int reduced)
     start_timer();
     (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &found);
     const unsigned long touch = instructions_since_start();
-    uint32_t told = 0;
+    uint32_t reported = 0;
     start_timer();
     (void)eits_gestures_update(&gestures, touches, found, gestures.time_us + FRAME_US, events,
-                               EITS_MAX_EVENTS, &told);
+                               EITS_MAX_EVENTS, &reported);
     const unsigned long gesture = instructions_since_start();
     const unsigned long stack = stack_used(painted);
     printf("frame %u status %d stop %d iterations %lu macs %lu touchmacs %lu solve %lu touch %lu "

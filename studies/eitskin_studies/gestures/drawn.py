@@ -69,7 +69,7 @@ class DrawnGesture:
 
     @property
     def is_gesture(self) -> bool:
-        """Whether anything but down, move and up may be told."""
+        """Whether anything but down, move and up may be reported."""
         return self.kind not in NONE
 
 

@@ -111,11 +111,11 @@ def found_touches(
     skin.set_options(tracking(default_options(skin.model)))
     skin.tare(untouched_v)
     skin.forget()
-    told = []
+    reported = []
     for number, frame in enumerate(frames_v):
         try:
             touches = skin.reconstruct(frame).touches
         except FrameError:
             touches = ()
-        told.append(TouchedFrame(round(number * 1e6 / RATE_HZ), touches))
-    return told
+        reported.append(TouchedFrame(round(number * 1e6 / RATE_HZ), touches))
+    return reported

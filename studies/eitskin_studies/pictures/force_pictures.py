@@ -113,14 +113,14 @@ def draw_detection(path: Path, found: list[Detection]) -> None:
         figure = matplotlib.figure.Figure(figsize=(6.4, 4.4), layout="constrained")
         axes = figure.add_subplot()
         for radius, (colour, where) in enumerate(zip(COLOURS, NAMES, strict=True)):
-            told = np.array([(one.snr_db, *one.threshold(radius)) for one in found])
-            told = told[np.isfinite(told[:, 1])]
-            top = np.where(np.isfinite(told[:, 3]), told[:, 3], found[0].loads_g[-1])
-            bars = np.maximum([told[:, 1] - told[:, 2], top - told[:, 1]], 0)
-            snr_db = told[:, 0] + 0.5 * (radius - 1.5)  # side by side
+            reported = np.array([(one.snr_db, *one.threshold(radius)) for one in found])
+            reported = reported[np.isfinite(reported[:, 1])]
+            top = np.where(np.isfinite(reported[:, 3]), reported[:, 3], found[0].loads_g[-1])
+            bars = np.maximum([reported[:, 1] - reported[:, 2], top - reported[:, 1]], 0)
+            snr_db = reported[:, 0] + 0.5 * (radius - 1.5)  # side by side
             axes.errorbar(
                 snr_db,
-                told[:, 1],
+                reported[:, 1],
                 bars,
                 fmt="o-",
                 color=colour,

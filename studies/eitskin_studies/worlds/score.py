@@ -96,7 +96,7 @@ class CoreFinder:
         self.diagnostics: tuple[str, ...] = ()
 
     def look_for(self, sign: str | None) -> None:
-        """Changes of ``sign`` from now on; None: as the solver was told at first."""
+        """Changes of ``sign`` from now on; None: as the solver was reported at first."""
         self.solver.set_options(sign=sign or self._own_sign)
 
     def __call__(

@@ -64,9 +64,9 @@ def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_i
     assert [head.open_electrodes for head in heads(items)] == [
         (OFF,) if FROM_FRAME <= head.frame - first < UNTIL_FRAME else () for head in heads(items)
     ]
-    told = [fault for fault in faults(items) if fault[0] == FaultCode.ELECTRODE_OPEN]
+    reported = [fault for fault in faults(items) if fault[0] == FaultCode.ELECTRODE_OPEN]
     gone = first + UNTIL_FRAME + FAULT_CLEAR_FRAMES - 1
-    assert told == [
+    assert reported == [
         (FaultCode.ELECTRODE_OPEN, True, OFF, first + FROM_FRAME),
         (FaultCode.ELECTRODE_OPEN, False, OFF, gone),
     ]
@@ -82,8 +82,8 @@ def test_it_is_told_though_nobody_wants_images():
     with sim_device(board()) as device:
         device.tare(UNTOUCHED)
         device.start_scene()
-        told = faults(device.stream(Stream.RAW))
-    found = [fault[:3] for fault in told]
+        reported = faults(device.stream(Stream.RAW))
+    found = [fault[:3] for fault in reported]
     assert found == [(FaultCode.ELECTRODE_OPEN, True, OFF), (FaultCode.ELECTRODE_OPEN, False, OFF)]
 
 
@@ -177,7 +177,7 @@ def test_what_fault_and_head_tell_is_said_once():
     rise = Fault(FaultCode.ELECTRODE_OPEN, True, 41, 5, 0)
     over = Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)
     what_to_do = "it makes no contact; wet or press it, then tare"
-    for told, said in (
+    for reported, said in (
         (rise, [f"electrode 5 open, frame 41: {what_to_do}"]),
         (solved(41, open_electrodes=(5,), **opened), []),
         # the fault of 9 was lost
@@ -186,14 +186,16 @@ def test_what_fault_and_head_tell_is_said_once():
         (over, ["electrode 5 open: over, frame 53"]),
         (over, []),
     ):
-        assert events.lines(told if isinstance(told, Frame) else notice_of(told)) == said
+        assert (
+            events.lines(reported if isinstance(reported, Frame) else notice_of(reported)) == said
+        )
 
 
 def test_a_bridged_pair_is_said_once():
     events, both = Novelty(), (0xC0, 0, 0, 0, 0)
     what_to_do = "water, paste or a wire joins them; dry or part them"
     pair = {"diagnostics": bits("electrodes bridged"), "bridged_electrodes": (6, 7)}
-    for told, said in (
+    for reported, said in (
         (Fault(FaultCode.BRIDGED, True, 3, 6, 7, both),
          [f"electrodes 6 and 7 bridged, frame 3: {what_to_do}"]),
         (Fault(FaultCode.BRIDGED, True, 3, 7, 6, both), []),
@@ -201,11 +203,13 @@ def test_a_bridged_pair_is_said_once():
         (Fault(FaultCode.BRIDGED, False, 11, 6, 0), ["electrode 6 bridged: over, frame 11"]),
         (Fault(FaultCode.BRIDGED, False, 11, 7, 0), ["electrode 7 bridged: over, frame 11"]),
     ):  # fmt: skip
-        assert events.lines(told if isinstance(told, Frame) else notice_of(told)) == said
+        assert (
+            events.lines(reported if isinstance(reported, Frame) else notice_of(reported)) == said
+        )
 
 
 def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts():
     events, off = Novelty(), {"diagnostics": bits("model mismatch"), "model_mismatch": 0.125}
     frames = ((k, off if k in (2, 3, 7, 8, 9, 10) else {}) for k in range(1, 12))
-    told = [events.lines(solved(frame, **found)) for frame, found in frames]
-    assert told == [[]] * 8 + [["model mismatch 12.5 %, frame 9"], [], []]
+    reported = [events.lines(solved(frame, **found)) for frame, found in frames]
+    assert reported == [[]] * 8 + [["model mismatch 12.5 %, frame 9"], [], []]

@@ -123,16 +123,16 @@ def test_a_killed_recorder_loses_at_most_the_last_packet(seed, tmp_path):
         [sys.executable, "-c", script, path], stdout=subprocess.PIPE, text=True
     ) as child:
         assert child.stdout is not None
-        told = [child.stdout.readline().strip() for _ in range(30 + 20 * seed)]
+        reported = [child.stdout.readline().strip() for _ in range(30 + 20 * seed)]
         time.sleep(0.001 * random.Random(seed).random())
         child.kill()
-        told += child.stdout.read().split()
+        reported += child.stdout.read().split()
     assert child.returncode == -signal.SIGKILL
     with open_device(f"file:{path}") as device:
         replayed = list(device.stream(ALL))
         assert device.counters.gaps == device.counters.crc_errors == 0
         assert device.counters.framing_errors <= 1  # the packet that was being written
-    assert [type(item).__name__ for item in replayed][: len(told)] == told
+    assert [type(item).__name__ for item in replayed][: len(reported)] == reported
     with sim_device() as device:  # the same run again, live
         device.tare(UNTOUCHED)
         live = islice(device.stream(ALL), len(replayed))

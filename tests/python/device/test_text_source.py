@@ -88,7 +88,7 @@ def piped(folder: Path, data: bytes) -> Path:
 
 
 def streamed(url: str, *, tare: int = 8) -> tuple[list[object], LinkCounters]:
-    """The raw frames after a tare and what else was told; what was counted."""
+    """The raw frames after a tare and what else was reported; what was counted."""
     with open_device(url) as device:
         device.tare(tare)
         return list(device.stream(Stream.RAW)), device.counters

@@ -75,12 +75,12 @@ def test_a_drive_has_the_hosts_bits_and_a_bounded_cost(cortex_m7, tmp_path, name
     fast = FastCore(engine)
     fast.begin()
     assert fast.bytes >= board.fast_bytes > 16_000  # pointers are smaller there
-    told = iter(board.drives)
+    reported = iter(board.drives)
     drive_s = ROW_S * len(v0) / len(fast.rows)
     for k, (scan, seen) in enumerate(zip(scans, board.scans, strict=True)):
         for n, number in enumerate(order(fast)):
             here = fast.drive(number, scan[fast.rows[number]], (k * len(fast.rows) + n) * drive_s)
-            there = next(told)
+            there = next(reported)
             assert (there.drive, there.status) == (number, 0)
             assert there.touches == printed(here)
         aligned = fast.aligned(scan)
@@ -93,5 +93,5 @@ def test_a_drive_has_the_hosts_bits_and_a_bounded_cost(cortex_m7, tmp_path, name
     assert max(drive.stack_bytes for drive in board.drives) < 5000
     followed = [one.instructions for one in board.drives if one.touches.startswith("1 ")]
     assert name != "one" or np.median(followed) < ONE_TOUCH
-    told_of = any(drive.touches[0] != "0" for drive in board.drives)
-    assert name == "light" or told_of == (name != "quiet")
+    reported_of = any(drive.touches[0] != "0" for drive in board.drives)
+    assert name == "light" or reported_of == (name != "quiet")

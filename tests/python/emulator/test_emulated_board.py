@@ -51,7 +51,7 @@ def test_the_generator_runs_at_50_khz(untouched):
 def test_the_image_passes_every_check(image):
     """Of those that notice a mutant in test_mutations.py."""
     session = run_session(image)
-    assert {check.__name__: told for check in CHECKS if (told := check(session))} == {}
+    assert {check.__name__: reported for check in CHECKS if (reported := check(session))} == {}
 
 
 def amplitude_errors_lsb(device: Device) -> np.ndarray:
@@ -83,8 +83,8 @@ def test_touches_and_images_are_the_host_s_to_the_bit(image):
     for frame, result in zip(seen, host, strict=True):
         assert frame.info is not None
         assert result is not None
-        told = frame.info.macs, frame.info.iterations
-        assert told == (result.info.macs, result.info.iterations)
+        reported = frame.info.macs, frame.info.iterations
+        assert reported == (result.info.macs, result.info.iterations)
     truth = np.array([[-40.0, 10.0], [30.0, -25.0]])
     for frame in seen[2:]:
         assert frame.touches is not None
@@ -137,9 +137,9 @@ def test_frame_rates(image, check_every, rows):
     stages = device.stats().stages
     own_us = {name: stages[name].last_us for name in ("solve", "touches", "demodulate", "send")}
     bound = "the solve" if frame_us > 1.02 * scan_us else "the scan"
-    told = ", ".join(f"{name} {us / 1000:.2f} ms" for name, us in own_us.items())
+    reported = ", ".join(f"{name} {us / 1000:.2f} ms" for name, us in own_us.items())
     rate = f"scan {scan_us / 1000:.2f} ms, frame {frame_us / 1000:.2f} ms ({1e6 / frame_us:.1f} Hz)"
-    print(f"{rows} rows: {rate}; {told}: {bound} bounds it")
+    print(f"{rows} rows: {rate}; {reported}: {bound} bounds it")
     assert abs(scan_us - rows * device.board.slot_us) <= 2 * device.board.slot_us
     # they overlap: it is not their sum
     assert scan_us - 1 <= frame_us <= max(scan_us, sum(own_us.values())) * 1.1

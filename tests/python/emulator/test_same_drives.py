@@ -149,5 +149,5 @@ def test_both_boards_tell_the_same_of_the_same_volts(tmp_path, cortex_m7):
     ]
     assert one.facts() == other.facts()
     # both fingers, and frames both solved and left to the next
-    assert {len(told.touches) for told in one.drives} == {0, 1, 2}
+    assert {len(reported.touches) for reported in one.drives} == {0, 1, 2}
     assert len(one.raw) == FRAMES and 2 < len(one.touches) < FRAMES

@@ -135,8 +135,8 @@ def test_the_same_bits_as_the_host(run):
             continue
         board = images.pop(raw.frame)
         assert board.image.tobytes() == expected.image.tobytes(), f"frame {raw.frame}"
-        told = board.solved.stop, board.solved.iterations
-        assert told == (expected.info.stop, expected.info.iterations)
+        reported = board.solved.stop, board.solved.iterations
+        assert reported == (expected.info.stop, expected.info.iterations)
         assert [replace(touch, id=0) for touch in touches[raw.frame].touches] == [
             replace(touch, id=0) for touch in expected.touches
         ]

@@ -165,19 +165,21 @@ def test_numbering_is_told_by_two_known_touches(rotate, mirror, option):
     assert finding.evidence[option] > 0.98 > finding.evidence["as given"] + 0.05
 
 
-def test_numbering_of_a_symmetric_skin_is_declared_untold_without_a_touch():
+def test_numbering_of_a_symmetric_skin_is_declared_inconclusive_without_a_touch():
     frames = as_if_electrodes(healthy_frames(6), electrode_map(16, 5, True), seed=6)
     known, unknown_places = report_of(untouched_only(frames)), report_of(frames, None)
     assert named(known) == []
     for report, option in ((known, "--touch X,Y"), (unknown_places, "--skin")):
-        told = [text for text in report.untold if "in which direction the numbers run" in text]
-        assert any(option in text for text in told)
+        reported = [
+            text for text in report.inconclusive if "in which direction the numbers run" in text
+        ]
+        assert any(option in text for text in reported)
 
 
 def test_one_touch_leaves_its_mirror_image_and_says_so():
     report = report_of(healthy_frames(7, touches_mm=((0.0, 60.0),)))
     assert named(report) == []
-    assert any("fits as given, but --mirror too" in text for text in report.untold)
+    assert any("fits as given, but --mirror too" in text for text in report.inconclusive)
 
 
 def test_numbering_of_an_odd_outline_is_told_by_the_untouched_frame():
@@ -373,11 +375,12 @@ def test_a_wrong_unit_is_noted():
     assert finding.evidence["reference_per_predicted"] == pytest.approx(1000, rel=0.05)
 
 
-def test_one_untouched_frame_leaves_noise_untold():
+def test_one_untouched_frame_leaves_noise_inconclusive():
     report = report_of(healthy_frames(22, untouched=1))
     assert named(report) == [] and "snr_db" not in report.measured
     assert any(
-        text.startswith("noise, SNR and drift: 1 untouched frame(s)") for text in report.untold
+        text.startswith("noise, SNR and drift: 1 untouched frame(s)")
+        for text in report.inconclusive
     )
 
 

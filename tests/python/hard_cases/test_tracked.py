@@ -52,8 +52,8 @@ def test_noise_that_flickers(same_everywhere, margins):
 
 
 def test_a_finger_that_lifts(same_everywhere, margins):
-    """A clear touch that is lifted is told no more from the next frame on, and one that comes at
-    its place later is another."""
+    """A clear touch that is lifted is no longer reported from the next frame on, and one that comes
+    at its place later is another."""
     place = (10.0, 15.0)
     path = [place] * 8 + [None] * 5 + [place] * 3 + [None] + [place] * 2
     _, outcomes = same_everywhere.steps([*head(options()), Play(frames_of(path, 1.0, 133))])

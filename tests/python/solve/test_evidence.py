@@ -146,11 +146,11 @@ def test_the_tare_tells_how_far_a_skin_moves_places():
     on either."""
     model = prebuilt()[0]
     assert model.model_errors is not None
-    untold = encode_model(replace(model, model_errors=replace(model.model_errors, places=None)))
+    without = encode_model(replace(model, model_errors=replace(model.model_errors, places=None)))
     least: dict[str, list[float]] = {}
     for name in ("discs_1_to_3", "uneven_20_percent", "misplaced_3_mm"):
         scenes = world(name, 6)
-        for content in (blob(), untold):
+        for content in (blob(), without):
             solver = Reconstructor(decode_model(content, "x"), blob=content)
             variances = []
             for untouched_v, frame_v in zip(scenes.untouched_v, scenes.frames_v, strict=True):
@@ -180,7 +180,7 @@ def test_both_widths_stop_at_the_same_column(columns):
 
 def test_long_touches_are_ellipses_and_discs_are_not():
     """By the angle of the true long axis, or said to be a disc."""
-    told = 0
+    known = 0
     for name in ("ellipses", "fingers", "eight_at_4_radii", "uneven_20_percent"):
         scenes = world(name)
         for scene, untouched_v, frame_v in zip(
@@ -197,8 +197,8 @@ def test_long_touches_are_ellipses_and_discs_are_not():
                 off = (np.degrees(np.arctan2(y, x)) - near.shape.angle_deg + 90) % 180 - 90
                 assert abs(off) <= 15
                 assert 1 < (x * x + y * y) / touch.radius_mm**2 < 4.5
-                told += 1
-    assert told >= 4
+                known += 1
+    assert known >= 4
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -43,7 +43,7 @@ def options(**changes: object) -> Options:
     return replace(tracking(default_options(prebuilt()[0])), **changes)
 
 
-def told(chosen: Options) -> list[tuple[Touch, ...]]:
+def reported(chosen: Options) -> list[tuple[Touch, ...]]:
     """Of each frame, by the C core in double."""
     untouched_v, frames_v = stream()
     made = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1], options=chosen)
@@ -77,7 +77,7 @@ def test_a_finger_keeps_its_id(changes):
     chosen = options(**changes)
     owner: dict[int, str] = {}
     first: dict[str, int] = {}
-    for k, touches in enumerate(told(chosen)):
+    for k, touches in enumerate(reported(chosen)):
         strengths = [touch.strength_s_per_m_mm2 for touch in touches]
         assert strengths == sorted(strengths, reverse=True)
         assert len({touch.id for touch in touches}) == len(touches)
@@ -107,15 +107,15 @@ def test_what_went_before_changes_nothing():
     made.tare(untouched_v)
     assert not any(made.reconstruct(frame).touches for frame in untouched_v[:12])
     after = [made.reconstruct(frame).touches for frame in frames_v]
-    assert after == told(options())
+    assert after == reported(options())
 
 
 def test_tracking_tells_fewer_false_touches_and_fewer_ids():
     """Of a detection threshold that lets noise pass, and without the test of touches, which does
     not."""
     low = {"detection_factor": 0.7, "touch_test": 0}
-    bare = told(replace(default_options(prebuilt()[0]), **low))
-    tracked = told(replace(options(), **low))
+    bare = reported(replace(default_options(prebuilt()[0]), **low))
+    tracked = reported(replace(options(), **low))
     ids = [len({touch.id for touches in some for touch in touches}) for some in (bare, tracked)]
     assert 3 <= ids[1] < ids[0]
     assert sum(map(len, tracked)) < sum(map(len, bare))

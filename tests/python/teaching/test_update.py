@@ -1,5 +1,5 @@
 """A taught model after remounting or drying: a few presses adapt it, or it stays as it is; from the
-untouched skin alone it is told whether it fits."""
+untouched skin alone a model is checked for whether it fits."""
 
 from dataclasses import replace
 from typing import Any

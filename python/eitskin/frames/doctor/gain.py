@@ -57,7 +57,7 @@ def check_resemblance(case: Case) -> CheckOutcome:
     size = np.abs(predicted)
     if size.size < MIN_CHANNELS or np.ptp(size) <= SAME * size.max():
         return CheckOutcome(
-            untold=("whether this is a homogeneous skin: too few channels, or all alike",)
+            inconclusive=("whether this is a homogeneous skin: too few channels, or all alike",)
         )
     reached = correlation(np.abs(measured), size)
     summary = {"reference_correlation": round(reached, 4)}
@@ -84,7 +84,7 @@ def check_gain(case: Case) -> tuple[Case, CheckOutcome]:
     """
     gain, strong = channel_gains(case)
     if strong.sum() < 4:
-        return case, CheckOutcome(untold=("gains: too few channels are left",))
+        return case, CheckOutcome(inconclusive=("gains: too few channels are left",))
     spread = robust_spread(gain[strong])
     measured = {"gain_spread": round(spread, 4)}
     findings = _pair_findings(case, gain, strong, spread)
@@ -120,7 +120,9 @@ def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
     """Check whether the numbers can be volts, if the skin's conductivity and the current are
     known."""
     if case.skin is None:
-        return CheckOutcome(untold=("the unit: it needs a skin with its conductivity (--skin)",))
+        return CheckOutcome(
+            inconclusive=("the unit: it needs a skin with its conductivity (--skin)",)
+        )
     if not case.trusted.any():
         return CheckOutcome()
     measured_v, per_a = (

@@ -38,12 +38,12 @@ def check_noise(case: Case) -> CheckOutcome:
             f"noise, SNR and drift: {len(untouched)} untouched frame(s), they need at least"
             f" {MIN_UNTOUCHED}"
         )
-        return CheckOutcome(untold=(few,))
+        return CheckOutcome(inconclusive=(few,))
     trusted = np.flatnonzero(case.trusted)
     noise = channel_noise(untouched[:, trusted])
     level, sigma = rms(case.reference[trusted]), rms(noise)
     if sigma == 0 or level == 0:
-        return CheckOutcome(untold=("noise and SNR: the untouched frames are all the same",))
+        return CheckOutcome(inconclusive=("noise and SNR: the untouched frames are all the same",))
     usual = np.maximum(_usual_noise(case, noise), np.median(noise) / NOISY_TIMES)
     noisy = (noise > NOISY_TIMES * usual) & (np.median(noise) > 0)
     healthy_sigma = rms(noise[~noisy]) or sigma

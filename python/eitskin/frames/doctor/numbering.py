@@ -86,7 +86,7 @@ def check_numbering(case: Case) -> tuple[Case, CheckOutcome]:
         [[correlation(np.abs(case.predicted), np.abs(frame)) for frame in side] for side in frames]
     )
     if (alike >= SAME_FRAME).all():
-        return case, CheckOutcome(untold=(ALL_ALIKE,))
+        return case, CheckOutcome(inconclusive=(ALL_ALIKE,))
     order = ranked(_likeness(case, frames))
     given, best = next(numbering for numbering in order if numbering.given), order[0]
     measured = {
@@ -100,7 +100,7 @@ def check_numbering(case: Case) -> tuple[Case, CheckOutcome]:
         text = (
             f"whether {' or '.join(map(str, like_given[:SHOWN]))}: the untouched frame is the same"
         )
-        return case, CheckOutcome(untold=(text,) if like_given else (), measured=measured)
+        return case, CheckOutcome(inconclusive=(text,) if like_given else (), measured=measured)
     text = (
         f"the untouched frame fits the skin's shape when the electrodes are renumbered ({best}),"
         " not as they are"

@@ -37,7 +37,10 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
     size = np.abs(cases[0].predicted)
     if own >= 0 and np.ptp(size) <= SAME * size.max():
         return OrderChoice(
-            own, CheckOutcome(untold=("the channel order: the protocol makes all channels alike",))
+            own,
+            CheckOutcome(
+                inconclusive=("the channel order: the protocol makes all channels alike",)
+            ),
         )
     reached = [likeness(case, allow_fault=False) for case in cases]
     if max(reached) < LIKELY:
@@ -128,7 +131,7 @@ def check_sign(case: Case) -> tuple[Case, CheckOutcome]:
         return _times(case, -1.0), CheckOutcome((finding,))
     if not mixed and positive_share > 0.5 and not some_negative:
         text = "whether these are magnitudes: the homogeneous frame is above 0 everywhere, too"
-        return case, CheckOutcome(untold=(text,))
+        return case, CheckOutcome(inconclusive=(text,))
     return case, CheckOutcome()
 
 

@@ -33,7 +33,7 @@ def check_reciprocity(case: Case) -> CheckOutcome:
     first, second, sign = pairs.first[both], pairs.second[both], pairs.sign[both]
     if not len(first):
         text = "reciprocity: the protocol has no two channels of one voltage"
-        return CheckOutcome(untold=(text,))
+        return CheckOutcome(inconclusive=(text,))
     reference = case.reference
     level = rms(reference[case.trusted])
     if level == 0:

@@ -129,8 +129,8 @@ class SceneMaker:
             for snr_db in (60.0, 40.0)[: 1 if number else 2]:
                 for half, lifted in sorted({(one.half, one.lifted) for one in FAULTS}):
                     some = [f for f in FAULTS if (f.half, f.lifted) == (half, lifted)]
-                    told = [(f, None if f.lifted else case.scene) for f in some]
-                    yield self._of_case("faults", case, snr_db, told)
+                    reported = [(f, None if f.lifted else case.scene) for f in some]
+                    yield self._of_case("faults", case, snr_db, reported)
 
     def _case(
         self, maker: CaseMaker, name: str, number: int, scene: TouchScene, *, faults: bool = False

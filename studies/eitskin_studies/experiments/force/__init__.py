@@ -51,8 +51,10 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     reported = put("force reported", settings.seed, scenes.spread_rows(places))
     light = put("force light", settings.seed, scenes.light_rows(radius_mm, settings.count(15, 6)))
 
-    told, of_laws = (_read(workspace, instruments, one, SNR_DB) for one in (nominal, uncertain))
-    drawn = curves.curves_of(nominal, told, uncertain, of_laws)
+    nominal_read, of_laws = (
+        _read(workspace, instruments, one, SNR_DB) for one in (nominal, uncertain)
+    )
+    drawn = curves.curves_of(nominal, nominal_read, uncertain, of_laws)
     judged: dict[tuple[str, float], anywhere.Anywhere] = {}
     for snr in workspace.progress(SNRS_DB, "calibrating"):
         on, read = (_read(workspace, instruments, one, snr) for one in (tuned, reported))

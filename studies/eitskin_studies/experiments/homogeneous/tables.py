@@ -137,12 +137,12 @@ def _interval(values: Sequence[float]) -> str:
 
 
 def _doctors_numbers(row: Row) -> str:
-    told = []
+    reported = []
     for key, form in (
         ("gain_spread", "{:.1%}"),
         ("reciprocity_rms", "{:.2%}"),
         ("snr_db", "{:.1f} dB"),
     ):
         values = [one[key] for one in row.measured if one.get(key) is not None]
-        told.append(form.format(float(np.median(values))).replace("%", " %") if values else "-")
-    return ", ".join(told)
+        reported.append(form.format(float(np.median(values))).replace("%", " %") if values else "-")
+    return ", ".join(reported)

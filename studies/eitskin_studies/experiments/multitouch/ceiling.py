@@ -33,8 +33,8 @@ MIN_RADIUS_MM, MAX_RADIUS_MM = 1.0, 30.0
 CLEAR_DEVIATIONS = 3.0
 
 
-class Told(OracleEngine):
-    """The oracle, whose fit starts at the places that it is told."""
+class GivenPlaces(OracleEngine):
+    """The oracle, whose fit starts at the places that it is given."""
 
     def __init__(self, model: Model) -> None:
         super().__init__(model)
@@ -48,7 +48,7 @@ class Told(OracleEngine):
 
 def core_told(model: Model, measured: MeasuredFrames, scenes: Sequence[TouchScene]) -> list[bool]:
     """Whether the fit that begins at the truth is exact, for each scene."""
-    engine = Told(model)
+    engine = GivenPlaces(model)
     engine.set_reference(measured.untouched_v)
     exact = []
     for frame_v, scene in zip(measured.frames_v[:, -1], scenes, strict=True):

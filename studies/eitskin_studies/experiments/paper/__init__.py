@@ -147,8 +147,10 @@ def _table(exact: dict[tuple[str, str], list[list[bool]]]) -> Table:
     for k in range(MOST):
         cells = []
         for column in columns:
-            told = [frame[k] for frame in exact[column] if k < len(frame)]
-            cells.append(f"{100 * share(sum(told), len(told)).mean:.0f}" if told else "-")
+            reported = [frame[k] for frame in exact[column] if k < len(frame)]
+            cells.append(
+                f"{100 * share(sum(reported), len(reported)).mean:.0f}" if reported else "-"
+            )
         rows.append((str(k + 1), *cells))
     short = {name: name.split(" 6 mm")[0] for name in READINGS}
     head = ("weights", *(f"{short[name]}: {what}" for name, what in columns))

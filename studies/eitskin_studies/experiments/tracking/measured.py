@@ -1,5 +1,5 @@
-"""Streams measured with noise and reconstructed by the core: what is told in each frame, by each
-way of tracking."""
+"""Streams measured with noise and reconstructed by the core: what is reported in each frame, by
+each way of tracking."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -87,12 +87,12 @@ class Measurer:
         }
 
         def make() -> dict[str, object]:
-            told, macs = self.told(stream, snr_db, way.options)
-            return count_stream(stream, told, macs).as_dict()
+            reported, macs = self.reported(stream, snr_db, way.options)
+            return count_stream(stream, reported, macs).as_dict()
 
         return TrackCount(**self.workspace.kept(facts, make))
 
-    def told(
+    def reported(
         self, stream: TouchStream, snr_db: float, options: Options
     ) -> tuple[list[tuple[Touch, ...]], int]:
         """The touches of each frame, and the MACs of all."""
