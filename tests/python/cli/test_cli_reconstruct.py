@@ -270,7 +270,7 @@ def test_the_demo(tmp_path, ran):
     assert 0 < difference["C float32 to numpy"] < 1e-4 and difference["C float64 to numpy"] < 1e-9
 
 
-def test_tracked_frames_keep_ids_and_confirm_births(json_of, tmp_path):
+def test_tracked_frames_keep_ids_and_confirm_starts(json_of, tmp_path):
     """A finger that moves 2 mm a frame keeps one id; each frame by itself counts on."""
     moving = tuple(TouchScene(str(k), (Put(-20.0 + 2 * k, 30.0, 9.0, 5.0),)) for k in range(8))
     made = simulate(paper_skin(), adjacent(16), TouchSet("moving", 1, moving)).as_frames()

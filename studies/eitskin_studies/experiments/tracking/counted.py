@@ -1,5 +1,5 @@
-"""What a stream's touches are worth against the truth: counts, places, ids, and how late births and
-deaths are reported."""
+"""What a stream's touches are worth against the truth: counts, places, ids, and how late starts and
+ends are reported."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
