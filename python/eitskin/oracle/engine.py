@@ -368,8 +368,8 @@ class OracleEngine:
                 x, y = on_skin(model.grid, x, y)
             strength = disc.change * area_mm2(model, disc)
             touch = Touch(0, x, y, disc.radius_mm, strength, min(1.0, float(share)))
-            if model.load is not None:
-                force = model.load.forces_at(np.array([[x, y]]), np.array([strength]))
+            if model.force_law is not None:
+                force = model.force_law.forces_at(np.array([[x, y]]), np.array([strength]))
                 touch = replace(touch, force_n=float(force[0]))
             out.append(touch)
         out.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))

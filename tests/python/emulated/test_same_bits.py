@@ -15,7 +15,7 @@ import pytest
 from eitskin.core.options_table import ALL_TOUCH_FIT, SOLVERS
 from eitskin.core.results import Options
 from eitskin.model.eitm import encode_model
-from eitskin.model.force_law import LoadLaw
+from eitskin.model.force_law import ForceLaw
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
@@ -120,7 +120,7 @@ def test_loads_have_the_hosts_bits(same_everywhere):
     table = np.linspace(0, 6, 9, dtype=np.float32)
     gain = np.array([1.0, 0.07, -0.11, 0.23, 0.05, 0.19, -0.3, 0.2, 0.11, 0.4], dtype=np.float32)
     blob = encode_model(
-        replace(model, load=LoadLaw(table, 0.3 * table**1.3, gain, 3, 97.0, 0.8, 0.02))
+        replace(model, force_law=ForceLaw(table, 0.3 * table**1.3, gain, 3, 97.0, 0.8, 0.02))
     )
     random = simulated_session()
     found = same_everywhere(blob, random.untouched_v, random.frames_v[:6])

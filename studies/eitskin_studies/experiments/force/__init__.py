@@ -1,5 +1,5 @@
-"""Loads at four radii, a calibration that makes one load read the same anywhere, and the smallest
-load that is detected."""
+"""Weights at four radii, a calibration that makes one weight read the same anywhere, and the
+smallest weight that is detected."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from eitskin_studies.experiments.force.scenes import PressSet
 
 TITLE = (
-    "Loads at four radii, the calibration that makes one load read the same anywhere, and the"
-    " smallest load (Figs. 9 to 11)"
+    "Weights at four radii, the calibration that makes one weight read the same anywhere, and the"
+    " smallest weight (Figs. 9 to 11)"
 )
 
 SNR_DB, AVERAGED_DB = 60.0, 72.0  # the second is what the mean of sixteen frames at the first has
