@@ -21,7 +21,7 @@ from eitskin.frames.homogeneous import homogeneous
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.orders import match_rows, relabel, source_table, swap_map
 from eitskin.frames.placement import source_rows
-from eitskin.frames.repair import equalising_gains, flipped, imputed, kept_channels, signed
+from eitskin.frames.repair import equalising_gains, flipped, imputed, kept_rows, signed
 from eitskin.frames.source import (
     RawFrames,
     SourceOptions,
@@ -77,7 +77,7 @@ def import_frames(
     rows = relabel(rows, swap_map(n, options.swaps))
     predicted = options.sign == "magnitude" or options.equalise
     prediction = homogeneous(skin, n).voltages(rows) if predicted else None
-    keep = kept_channels(rows, n, options.drop_channels, options.drop_electrodes)
+    keep = kept_rows(rows, n, options.drop_channels, options.drop_electrodes)
     for_all = (rows, n, options.impute_channels)
     signs = (signed(values, options.sign, prediction) for values in (voltage, reference))
     turned = (flipped(values, options.flip_channels) for values in signs)

@@ -32,7 +32,7 @@ def healthy_frames(
 ) -> Frames:
     """Untouched frames and one frame with touches that change its voltages by at most 5 %.
 
-    Every channel has a gain of its own (standard deviation ``gain``) and noise at ``snr_db``.
+    Every row has a gain of its own (standard deviation ``gain``) and noise at ``snr_db``.
     """
     rng = np.random.default_rng(seed)
     protocol = adjacent(16) if protocol is None else protocol
@@ -72,7 +72,7 @@ def changed(frames: Frames, reference: FloatArray, voltage: FloatArray) -> Frame
 def permuted(
     frames: Frames, index: NDArray[np.int64], sign: NDArray[np.int64] | None = None
 ) -> Frames:
-    """Channel r replaced by channel ``index[r]`` times ``sign[r]``, labels left as they are."""
+    """Row r replaced by row ``index[r]`` times ``sign[r]``, labels left as they are."""
     factor = 1.0 if sign is None else sign
     return changed(
         frames, frames.reference_voltage_v[:, index] * factor, frames.voltage_v[:, index] * factor
@@ -80,7 +80,7 @@ def permuted(
 
 
 def times(frames: Frames, gains: FloatArray) -> Frames:
-    """Every channel r times ``gains[r]``."""
+    """Every row r times ``gains[r]``."""
     return changed(frames, frames.reference_voltage_v * gains, frames.voltage_v * gains)
 
 
@@ -118,14 +118,14 @@ def dead(frames: Frames, *electrodes: int) -> Frames:
     return times(frames, np.where(gone, 1e-3, 1.0))
 
 
-def channels_off(frames: Frames, channels: list[int], gain: float) -> Frames:
+def rows_off(frames: Frames, rows: list[int], gain: float) -> Frames:
     gains = np.ones(frames.protocol.n_rows)
-    gains[channels] = gain
+    gains[rows] = gain
     return times(frames, gains)
 
 
 def pair_off(frames: Frames, columns: slice, gain: float) -> Frames:
-    """All channels that drive (columns 0, 1) or measure (2, 3) with the electrodes 3 and 4."""
+    """All rows that drive (columns 0, 1) or measure (2, 3) with the electrodes 3 and 4."""
     of_pair = (frames.protocol.drive_measure[:, columns] == [3, 4]).all(axis=1)
     return times(frames, np.where(of_pair, gain, 1.0))
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from injected import (
     as_if_electrodes,
-    channels_off,
     dead,
     healthy_frames,
     pair_off,
     reversed_sign,
     rotating,
+    rows_off,
     times,
     untouched_only,
     wired,
@@ -71,14 +71,14 @@ FAULTS: dict[str, tuple[Callable[[], Frames], str]] = {
         lambda: reversed_sign(rotating(dead(healthy_frames(7), 4))),
         "--order rotating --sign reversed --drop-electrodes 4",
     ),
-    "one channel": (
-        lambda: channels_off(healthy_frames(8), [40], 1.5), "--impute-channels 40"
+    "one row": (
+        lambda: rows_off(healthy_frames(8), [40], 1.5), "--impute-channels 40"
     ),
     "both of a pair": (
-        lambda: channels_off(healthy_frames(9), [0, 26], 1.5), "--drop-channels 0,26"
+        lambda: rows_off(healthy_frames(9), [0, 26], 1.5), "--drop-channels 0,26"
     ),
     "flipped": (
-        lambda: channels_off(healthy_frames(10), [17, 90], -1.0), "--flip-channels 17,90"
+        lambda: rows_off(healthy_frames(10), [17, 90], -1.0), "--flip-channels 17,90"
     ),
     "own gains": (
         lambda: times(healthy_frames(11), np.random.default_rng(11).uniform(0.8, 1.2, 208)),
@@ -102,7 +102,7 @@ def test_the_advice_mends(tmp_path, capsys, fault):
 def test_numbering_is_advised_by_known_touches_and_mends(tmp_path, capsys):
     (tmp_path / "skin.toml").write_text(SKIN)
     turned = as_if_electrodes(healthy_frames(13), electrode_map(16, 5, True), seed=13)
-    path = write(tmp_path / "s.npz", channels_off(turned, [40], 1.5))
+    path = write(tmp_path / "s.npz", rows_off(turned, [40], 1.5))
     repaired, skin = tmp_path / "repaired.npz", tmp_path / "skin.toml"
     touch = ("--skin", skin, "--touch", "30,40,8", "--touch=-50,10,8", "--touch-in", "0")
     assert run("doctor", path, *NPZ, *touch, "--json") == 11

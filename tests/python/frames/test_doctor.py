@@ -15,11 +15,11 @@ from injected import (
     FloatArray,
     as_if_electrodes,
     changed,
-    channels_off,
     healthy_frames,
     pair_off,
     reversed_sign,
     rotating,
+    rows_off,
     times,
     untouched_only,
     wired,
@@ -132,7 +132,7 @@ def test_reversed_polarity_is_recognised(protocol):
     assert finding.repair == "--sign reversed"
 
 
-def test_reversed_polarity_is_certain_once_a_channel_crosses_zero():
+def test_reversed_polarity_is_certain_once_a_row_crosses_zero():
     frames = healthy_frames(4)
     voltage = -frames.voltage_v.copy()
     voltage[0, 6] = -0.2 * rms(frames)
@@ -264,7 +264,7 @@ def test_an_electrode_lost_in_a_frame_is_named():
     voltage[:, (ROWS[:, :2] == 7).any(axis=1)] *= 1e-3
     finding = only(changed(frames, frames.reference_voltage_v, voltage), "electrode-lost")
     assert finding.evidence["electrode"] == 7 and finding.evidence["frames"] == [0]
-    # and beside a channel of it that is dead in the untouched frames too, so that no part of it is
+    # and beside a row of it that is dead in the untouched frames too, so that no part of it is
     # left
     dead = int(np.flatnonzero((ROWS[:, :2] == 7).any(axis=1))[3])
     reference = frames.reference_voltage_v.copy()
@@ -274,7 +274,7 @@ def test_an_electrode_lost_in_a_frame_is_named():
 
 
 @pytest.mark.parametrize("quantile", (0.9, 0.99))
-def test_saturated_channels_are_named(quantile):
+def test_saturated_rows_are_named(quantile):
     frames = healthy_frames(12)
     rail = float(np.quantile(np.abs(frames.reference_voltage_v), quantile))
     reference = np.clip(frames.reference_voltage_v, -rail, rail)
@@ -287,21 +287,21 @@ def test_saturated_channels_are_named(quantile):
 
 
 @pytest.mark.parametrize(
-    ("channels", "noise", "name", "repair"),
+    ("rows", "noise", "name", "repair"),
     [
         ([77], 20e-3, "noisy-channels", "--impute-channels 77"),
         ([13], 0.0, "stuck", "--impute-channels 13"),
         (np.flatnonzero((ROWS == 5).any(axis=1)), 20e-3, "noisy-channels", "--drop-electrodes 5"),
     ],
-    ids=["a noisy channel", "a stuck one", "a noisy electrode"],
+    ids=["a noisy row", "a stuck one", "a noisy electrode"],
 )
-def test_noise_of_its_own_and_none_are_named(channels, noise, name, repair):
+def test_noise_of_its_own_and_none_are_named(rows, noise, name, repair):
     frames, rng = healthy_frames(13), np.random.default_rng(13)
     reference = frames.reference_voltage_v.copy()
-    own = noise * rms(frames) * rng.normal(size=(len(reference), len(channels)))
-    reference[:, channels] = own + (reference[:, channels] if noise else reference[0, channels])
+    own = noise * rms(frames) * rng.normal(size=(len(reference), len(rows)))
+    reference[:, rows] = own + (reference[:, rows] if noise else reference[0, rows])
     finding = only(changed(frames, reference, frames.voltage_v), name)
-    assert finding.evidence["channels"] == list(channels) and finding.repair == repair
+    assert finding.evidence["channels"] == list(rows) and finding.repair == repair
 
 
 @pytest.mark.parametrize(("snr_db", "severity"), [(40.0, "note"), (20.0, "fault")])
@@ -322,7 +322,7 @@ def test_drift_is_measured_and_judged(drift, severity):
 
 def test_gain_faults_are_told_apart():
     frames = healthy_frames(16)
-    finding = only(channels_off(frames, [40], 1.4), "channel-gain")
+    finding = only(rows_off(frames, [40], 1.4), "channel-gain")
     assert finding.evidence["channels"] == [40] and finding.repair == "--impute-channels 40"
     assert finding.evidence["worst_gain"] == pytest.approx(1.4, rel=0.1)
     for name, columns, gain in (("drive", slice(0, 2), 0.7), ("measure", slice(2, 4), 1.3)):
@@ -338,14 +338,14 @@ def test_gain_faults_are_told_apart():
 
 def test_a_pair_that_breaks_reciprocity_is_named():
     assert ROWS[3].tolist() == [0, 1, 5, 6] and ROWS[65].tolist() == [5, 6, 0, 1]
-    frames = channels_off(channels_off(healthy_frames(17, gain=0.005), [3], 1.18), [65], 0.86)
+    frames = rows_off(rows_off(healthy_frames(17, gain=0.005), [3], 1.18), [65], 0.86)
     finding = only(frames, "reciprocity-pairs")
     assert list(finding.evidence["errors"]) == ["3/65"]
     assert finding.evidence["errors"]["3/65"] == pytest.approx(0.32 / 1.02, rel=0.1)
     assert finding.evidence["off"] == [3]
 
 
-def test_channels_of_the_wrong_sign_are_named():
+def test_rows_of_the_wrong_sign_are_named():
     finding = only(pair_off(healthy_frames(18), slice(0, 2), -1.0), "flipped-channels")
     assert "drive [3, 4]" in finding.text
     of_pair = (ROWS[:, :2] == [3, 4]).all(axis=1)
@@ -384,17 +384,17 @@ def test_one_untouched_frame_leaves_noise_inconclusive():
     )
 
 
-def stuck(frames: Frames, channels: list[int]) -> Frames:
-    """Channels that give one value in every untouched frame and in the others."""
+def stuck(frames: Frames, rows: list[int]) -> Frames:
+    """Rows that give one value in every untouched frame and in the others."""
     reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
-    reference[:, channels] = voltage[:, channels] = 1e-4
+    reference[:, rows] = voltage[:, rows] = 1e-4
     return changed(frames, reference, voltage)
 
 
-def not_finite(frames: Frames, channels: list[int]) -> Frames:
+def not_finite(frames: Frames, rows: list[int]) -> Frames:
     """NaN in the first untouched frame."""
     reference = frames.reference_voltage_v.copy()
-    reference[0, channels] = np.nan
+    reference[0, rows] = np.nan
     return changed(frames, reference, frames.voltage_v)
 
 
@@ -402,14 +402,14 @@ SEVERAL = {
     "two pairs of exchanged wires": (
         lambda: wired(8, (3, 9), (1, 14)), "swapped-electrodes", "--swap 3,9 --swap 1,14",
     ),
-    "two channels of the wrong sign": (
-        lambda: channels_off(healthy_frames(12), [17, 90], -1.0),
+    "two rows of the wrong sign": (
+        lambda: rows_off(healthy_frames(12), [17, 90], -1.0),
         "flipped-channels", "--flip-channels 17,90",
     ),
-    "two stuck channels": (
+    "two stuck rows": (
         lambda: stuck(healthy_frames(22), [4, 60]), "stuck", "--impute-channels 4,60",
     ),
-    "three channels with numbers that are not finite": (
+    "three rows with numbers that are not finite": (
         lambda: not_finite(healthy_frames(20), [3, 4, 8]),
         "not-finite", "--impute-channels 3,4,8",
     ),
@@ -463,7 +463,7 @@ def test_a_round_skin_needs_no_scipy():
     ],
 )
 def test_remedies_become_one(remedies, combined):
-    """Channel 26 is the reciprocal of channel 0: neither is filled from the other where both are
-    bad, and the channels of an electrode that goes are not named."""
+    """Row 26 is the reciprocal of row 0: neither is filled from the other where both are
+    bad, and the rows of an electrode that goes are not named."""
     case = SimpleNamespace(rows=adjacent(16).drive_measure, n_electrodes=16)
     assert combined_remedy(case, remedies) == combined

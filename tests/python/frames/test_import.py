@@ -151,7 +151,7 @@ def test_bad_values_pass_only_where_they_are_mended(tmp_path):
     np.savez(path, v=voltage, r=frames.reference_voltage_v)
     with pytest.raises(FrameError, match=r"frame 0, row 0 \(from 0\) is nan"):
         taken(path)
-    with pytest.raises(FrameError, match="frame 0, channel 0 is nan"):
+    with pytest.raises(FrameError, match="frame 0, row 0 is nan"):
         taken(path, impute_channels=(3,))
     repaired = taken(path, impute_channels=(0,))
     assert repaired.voltage_v[0, 0] == voltage[0, 26]
@@ -170,7 +170,7 @@ def test_equalised_gains_follow_the_prediction(tmp_path):
     weak[:, 40] *= 0.01
     np.savez(tmp_path / "weak.npz", v=frames.voltage_v, r=weak)
     with pytest.raises(
-        FrameError, match=r"channel 40 has 0\.0\d+ of its predicted reference \(1 such\)"
+        FrameError, match=r"row 40 has 0\.0\d+ of its predicted reference \(1 such\)"
     ):
         taken(tmp_path / "weak.npz", equalise=True)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from eitskin.arrays import BoolArray, FloatArray
 from eitskin.frames.doctor.case import Case, numbers
-from eitskin.frames.doctor.remedy import channel_remedy
+from eitskin.frames.doctor.remedy import row_remedy
 from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 
 MIN_TIES = 4
@@ -22,30 +22,30 @@ def check_clipping(case: Case) -> tuple[Case, CheckOutcome]:
     railed = at_rail(np.where(np.isfinite(frames), frames, 0.0))
     untouched = len(case.frames.reference_voltage_v)
     findings, trusted = [], case.trusted
-    channels = np.flatnonzero(railed.any(axis=0))
-    if len(channels):
+    rows = np.flatnonzero(railed.any(axis=0))
+    if len(rows):
         names = [case.frames.frame_name[k] for k in np.flatnonzero(railed[untouched:].any(axis=1))]
         levels = sorted({float(value) for value in frames[railed]})
-        text = f"{len(channels)} channel(s) stand at a rail: lower the gain or the current"
+        text = f"{len(rows)} row(s) stand at a rail: lower the gain or the current"
         one_rail = levels[-1] - levels[0] < 1e-6
         evidence = {
-            "channels": numbers(channels),
+            "channels": numbers(rows),
             "rail_v": levels[:1] if one_rail else [levels[0], levels[-1]],
             "readings": int(railed.sum()),
             "in_quiet_frames": int(railed[:untouched].sum()),
             "frames": names,
         }
-        remedy = channel_remedy(case, channels)
+        remedy = row_remedy(case, rows)
         findings.append(Finding("saturated", FAULT, text, evidence, remedy))
         trusted = trusted & ~railed[:untouched].any(axis=0)
     stuck = _stuck(case.frames.reference_voltage_v) & ~railed.any(axis=0)
     if stuck.any():
         found = numbers(np.flatnonzero(stuck))
         text = (
-            f"{len(found)} channel(s) read exactly the same in all {untouched} untouched frames"
+            f"{len(found)} row(s) read exactly the same in all {untouched} untouched frames"
             " while others vary"
         )
-        remedy = channel_remedy(case, found)
+        remedy = row_remedy(case, found)
         findings.append(Finding("stuck", FAULT, text, {"channels": found}, remedy))
         trusted = trusted & ~stuck
     return replace(case, trusted=trusted), CheckOutcome(tuple(findings))
@@ -72,9 +72,9 @@ def at_rail(frames: FloatArray) -> BoolArray:
         rest = values[(values > top / 2) & ~hits]
         different = len(np.unique(np.round(rest / (SAME * top))))
         usual = rest.size / different if rest.size else 1.0
-        channels = int(hits.any(axis=0).sum())
+        rows = int(hits.any(axis=0).sum())
         if hits.sum() >= max(MIN_TIES, TIES_PER_USUAL * usual) and (
-            rest.size or channels < frames.shape[1]
+            rest.size or rows < frames.shape[1]
         ):
             found |= hits
     return found

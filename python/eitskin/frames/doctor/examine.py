@@ -23,7 +23,7 @@ from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import homogeneous
 
 RENUMBER_FIRST = (
-    "how to repair findings that name an electrode or a channel: renumber by import first, then"
+    "how to repair findings that name an electrode or a row: renumber by import first, then"
     " examine again"
 )
 
@@ -54,7 +54,7 @@ def examine_case(subject: Subject) -> tuple[DoctorReport, Case]:
     case, clipping = check_clipping(case)
     case, wiring = check_wiring(case)
     if case.joined:
-        text = "gains, single channels and numbering: separate the joined electrodes first"
+        text = "gains, single rows and numbering: separate the joined electrodes first"
         outcomes += [sign, clipping, wiring, check_reciprocity(case), check_noise(case)]
         outcomes.append(CheckOutcome(inconclusive=(text,)))
         return _report(subject, case, outcomes), case
@@ -91,7 +91,7 @@ def _report(subject: Subject, case: Case, outcomes: list[CheckOutcome]) -> Docto
         findings = tuple(replace(f, repair="") if names_numbers(f.repair) else f for f in findings)
     frames = case.frames
     described = (
-        f"{frames.n_frames} frame(s) of {len(case.rows)} channels,"
+        f"{frames.n_frames} frame(s) of {len(case.rows)} rows,"
         f" {len(frames.reference_voltage_v)} untouched, {frames.protocol.n_electrodes} electrodes;"
         f" compared with {case.prediction.source}"
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.frames.doctor.case import Case, numbers, rms, short_list, strength_groups
-from eitskin.frames.doctor.remedy import channel_remedy
+from eitskin.frames.doctor.remedy import row_remedy
 from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 from eitskin.frames.orders import touching
 
@@ -24,7 +24,7 @@ DRIFT_FAULT = 0.02
 DRIFT_SIGMAS = 6.0
 
 
-def channel_noise(untouched: FloatArray) -> FloatArray:
+def row_noise(untouched: FloatArray) -> FloatArray:
     """Return the noise (m,) of each row from untouched frames (k, m)."""
     return np.asarray(np.sqrt((np.diff(untouched, axis=0) ** 2).mean(axis=0) / 2))
 
@@ -40,7 +40,7 @@ def check_noise(case: Case) -> CheckOutcome:
         )
         return CheckOutcome(inconclusive=(few,))
     trusted = np.flatnonzero(case.trusted)
-    noise = channel_noise(untouched[:, trusted])
+    noise = row_noise(untouched[:, trusted])
     level, sigma = rms(case.reference[trusted]), rms(noise)
     if sigma == 0 or level == 0:
         return CheckOutcome(inconclusive=("noise and SNR: the untouched frames are all the same",))
@@ -53,15 +53,15 @@ def check_noise(case: Case) -> CheckOutcome:
     findings: list[Finding] = []
     evidence: dict[str, object]
     if noisy.any():
-        channels = trusted[noisy]
-        shared = _common_electrode(case, channels)
-        text = f"{len(channels)} channel(s) are far noisier than the others: {short_list(channels)}"
-        remedy = channel_remedy(case, channels)
+        rows = trusted[noisy]
+        shared = _common_electrode(case, rows)
+        text = f"{len(rows)} row(s) are far noisier than the others: {short_list(rows)}"
+        remedy = row_remedy(case, rows)
         if shared is not None:
             text += f", all of electrode {shared} (from 0)"
             remedy = f"--drop-electrodes {shared}"
         evidence = {
-            "channels": numbers(channels),
+            "channels": numbers(rows),
             "times_usual": [round(float(v), 2) for v in noise[noisy] / usual[noisy]],
             "snr_db_without_them": round(float(healthy_snr), 2),
         }
@@ -105,11 +105,11 @@ def _drift(untouched: FloatArray, reference: FloatArray, sigma: float) -> tuple[
     return slope, float(sigma / np.linalg.norm(reference) / np.sqrt(when @ when))
 
 
-def _common_electrode(case: Case, channels: IntArray) -> int | None:
-    """Return the electrode that is in all of ``channels``, if these are a large part of its
+def _common_electrode(case: Case, rows: IntArray) -> int | None:
+    """Return the electrode that is in all of ``rows``, if these are a large part of its
     rows."""
     for electrode in range(case.n_electrodes):
         using = touching(case.rows, [electrode]) & case.trusted
-        if using[channels].all() and len(channels) >= MAX_OF_ELECTRODE * np.count_nonzero(using):
+        if using[rows].all() and len(rows) >= MAX_OF_ELECTRODE * np.count_nonzero(using):
             return electrode
     return None

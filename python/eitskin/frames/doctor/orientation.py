@@ -8,7 +8,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.frames.doctor.case import Case, cosine, rms
-from eitskin.frames.doctor.noise import MIN_UNTOUCHED, channel_noise
+from eitskin.frames.doctor.noise import MIN_UNTOUCHED, row_noise
 from eitskin.frames.doctor.numbering import Numbering, ranked, renumbered_frames
 from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 from eitskin.frames.homogeneous import touch_transfer
@@ -112,5 +112,5 @@ def _drowned(case: Case, measured: list[FloatArray], weight: FloatArray) -> bool
     untouched = case.frames.reference_voltage_v
     if len(untouched) < MIN_UNTOUCHED:
         return False
-    noise = rms((np.nan_to_num(channel_noise(untouched)) * weight)[case.trusted])
+    noise = rms((np.nan_to_num(row_noise(untouched)) * weight)[case.trusted])
     return rms(np.array([(change * weight)[case.trusted] for change in measured])) < AUDIBLE * noise
