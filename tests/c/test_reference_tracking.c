@@ -120,8 +120,7 @@ TEST(a_touch_lets_go_what_came_before_and_as_much_behind_it)
     CHECK_EQUAL(pass(&b, 1, 1), 1);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = R(NAN);
-    CHECK_EQUAL(eits_reconstruct(b.on.c.ctx, b.frame, SMALL_ROWS, NULL, NULL),
-                EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_reconstruct(b.on.c.ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ROWS);
     change_all(&b, 0.01);
     CHECK_EQUAL(pass(&b, 2 * APART - 1, 1), 0);
     CHECK_EQUAL(pass(&b, 1, 1), 1);

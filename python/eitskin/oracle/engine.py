@@ -223,7 +223,7 @@ class OracleEngine:
     def _check(self, frame: FloatArray, unusable: BoolArray, found: Found) -> None:
         if unusable.sum() > self.options.max_masked:
             raise FrameError(
-                with_diagnostics("frame: too many channels of the frame are unusable", found)
+                with_diagnostics("frame: too many rows of the frame are unusable", found)
             )
         dead = not unusable.all() and not frame[~unusable].any()
         if dead or found.no_signal:

@@ -202,7 +202,7 @@ def test_a_bad_frame_among_good_ones(changed_frames, tmp_path, ran):
     out, err = ran(8, f"reconstruct {path} --json -o {output}")
     facts = json.loads(out)
     assert [frame["refused"] is None for frame in facts["frames"]].count(False) == 2
-    assert "too many channels" in facts["frames"][3]["refused"]
+    assert "too many rows" in facts["frames"][3]["refused"]
     assert "zero" in facts["frames"][5]["refused"]
     lines = err.splitlines()
     assert len(lines) == 2 and all(line.startswith(f"eitskin: {path}: frame ") for line in lines)

@@ -134,8 +134,8 @@ def with_nan(count: int) -> np.ndarray:
 @pytest.mark.parametrize(
     ("voltage", "text"),
     [
-        (with_nan(150), "too many channels"),
-        (np.full((1, 208), np.inf), "too many channels"),
+        (with_nan(150), "too many rows"),
+        (np.full((1, 208), np.inf), "too many rows"),
         (np.zeros((1, 208)), "all voltages are zero; is the skin driven and connected?"),
     ],
     ids=["nan", "inf", "zero"],

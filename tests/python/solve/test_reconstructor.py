@@ -118,7 +118,7 @@ def test_a_refused_series_leaves_no_reference(engine):
         reconstructor.reconstruct(session().frames_v[0])
 
 
-# ---- channels that cannot be used ----
+# ---- rows that cannot be used ----
 
 
 def test_too_many_bad_channels(engine):
@@ -127,14 +127,14 @@ def test_too_many_bad_channels(engine):
     frame[:104] = np.nan
     assert reconstructor.reconstruct(frame).info.masked == 104
     frame[104] = np.nan
-    with pytest.raises(FrameError, match="too many channels"):
+    with pytest.raises(FrameError, match="too many rows"):
         reconstructor.reconstruct(frame)
     reconstructor.set_options(max_masked=3)
     frame = session().frames_v[0].copy()
     frame[:4] = np.inf
-    with pytest.raises(FrameError, match="too many channels"):
+    with pytest.raises(FrameError, match="too many rows"):
         reconstructor.reconstruct(frame)
-    with pytest.raises(FrameError, match="too many channels"):
+    with pytest.raises(FrameError, match="too many rows"):
         reconstructor.reconstruct(np.full(208, np.nan))
 
 
