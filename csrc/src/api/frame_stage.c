@@ -94,7 +94,7 @@ static eits_status check_rows(const eits_context *ctx, const eits_real *frame, u
 {
     *masked = count_unusable(ctx);
     if (*masked > ctx->options.max_masked)
-        return EITS_E_FRAME_CHANNELS;
+        return EITS_E_FRAME_ROWS;
     /* With every row out there is no reading that could be zero; max_masked has allowed it. */
     return *masked < ctx->model->n_rows && is_dead(ctx, frame) ? EITS_E_FRAME_ZERO : EITS_OK;
 }

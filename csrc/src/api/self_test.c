@@ -81,7 +81,7 @@ static uint32_t begin_trial(eits_context *ctx, const trial *t)
     return eits_crc32(0, status, sizeof status);
 }
 
-/* Touches, and what is told of them and of the image. */
+/* Touches, and what is reported about them and the image. */
 static uint32_t add_result(eits_context *ctx, uint32_t sum)
 {
     eits_touch touches[EITS_MAX_TOUCHES];
@@ -90,10 +90,10 @@ static uint32_t add_result(eits_context *ctx, uint32_t sum)
     (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count);
     sum = eits_crc32(sum, touches, count * sizeof touches[0]);
     const eits_info *info = &ctx->info;
-    const eits_real told[] = {info->lambda,         info->lambda_noise, info->gap_rel,
-                              info->residual,       info->data_norm,    info->unexplained,
-                              info->model_mismatch, ctx->reference.gain};
-    return eits_crc32(sum, told, sizeof told);
+    const eits_real reported[] = {info->lambda,         info->lambda_noise, info->gap_rel,
+                                  info->residual,       info->data_norm,    info->unexplained,
+                                  info->model_mismatch, ctx->reference.gain};
+    return eits_crc32(sum, reported, sizeof reported);
 }
 
 static uint32_t run_trial(eits_context *ctx, const trial *t)

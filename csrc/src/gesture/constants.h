@@ -98,7 +98,7 @@
 
 /* ---- Chosen: by hand; not measured. Check: ctest --preset host -R gesture */
 
-/* least step that a MOVE or a CHANGE tells [mm]. larger: coarse; smaller: noise is reported */
+/* least step that a MOVE or a CHANGE reports [mm]. larger: coarse; smaller: noise is reported */
 #define EITS_MOVE_MM R(1.0)
 
 /* a touch further away is no touch [mm]. larger: squares overflow; smaller: large skins */

@@ -29,7 +29,7 @@ def scenes(count: int, snr_db: float) -> tuple[np.ndarray, np.ndarray]:
     """Untouched frames, and five of ``count`` touches each."""
     drawn = random_touches(paper_skin().outline, 11, 5, "test", TouchRules(count=(count, count)))
     made = simulate(paper_skin(), adjacent(16), drawn, measurement=Measurement(snr_db=snr_db))
-    return made.quiet_v, made.frames_v
+    return made.untouched_v, made.frames_v
 
 
 def discs_of(fit: DiscFit, touches: tuple) -> list[Disc]:
@@ -66,13 +66,13 @@ def best_of_many(fit: DiscFit, discs: list[Disc], seed: int) -> float:
 def judged(count: int, snr_db: float) -> list[float]:
     """How much more the core's discs cost than the best found with as many, over the cost without
     any."""
-    quiet_v, frames_v = scenes(count, snr_db)
+    untouched_v, frames_v = scenes(count, snr_db)
     core = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1])
     oracle = OracleEngine(prebuilt()[0])
     core.set_options(**PLAIN)
     oracle.set_options(core.options)
-    core.tare(quiet_v)
-    oracle.set_reference(quiet_v)
+    core.tare(untouched_v)
+    oracle.set_reference(untouched_v)
     above = []
     for k, frame in enumerate(frames_v):
         core.forget()
@@ -95,10 +95,10 @@ def test_the_cores_fit_costs_little_more_than_the_best(count, snr_db):
 
 def test_the_best_fit_is_scipys():
     """Trust region reflective on the same residuals, from the same starts: no better."""
-    quiet_v, frames_v = scenes(3, 60.0)
+    untouched_v, frames_v = scenes(3, 60.0)
     oracle = OracleEngine(prebuilt()[0])
     oracle.set_options(replace(oracle.options, **PLAIN))
-    oracle.set_reference(quiet_v)
+    oracle.set_reference(untouched_v)
     for frame in frames_v[:4]:
         seen = oracle.explain(frame)
         fit = oracle.disc_fit(seen)

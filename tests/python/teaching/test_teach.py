@@ -1,4 +1,4 @@
-"""A model taught from a few presses finds others without any sign; odd places are told."""
+"""A model taught from a few presses finds others without any sign; odd places are reported."""
 
 from dataclasses import replace
 
@@ -154,8 +154,8 @@ def test_odd_places_are_told_and_taught(change, note):
 
 def test_the_share_serves_single_presses_and_sums_of_two():
     """Few sums have no say; many may cost a few single presses, not more."""
-    alone, told = np.array([0.9, 0.94, 0.96, 1.0]), np.array([0.9, 0.85, 0.7, 0.5])
-    two = np.linspace(0, 1, 200)[None] < told[:, None]
+    alone, reported = np.array([0.9, 0.94, 0.96, 1.0]), np.array([0.9, 0.85, 0.7, 0.5])
+    two = np.linspace(0, 1, 200)[None] < reported[:, None]
     assert best_share(alone, two) == 1 and best_share(alone, two[:, :0]) == 2
     assert best_share(0.9 * alone, two[:, :0]) == 3
     place = presses(40).place_mm
