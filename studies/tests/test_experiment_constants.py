@@ -16,7 +16,7 @@ from eitskin_studies.experiments.constants.sweep import (
     effects_of,
     numbers_of,
 )
-from eitskin_studies.experiments.constants.tables import changes_nothing, harm, tables_of, words_of
+from eitskin_studies.experiments.constants.tables import any_change, harm, tables_of, words_of
 from eitskin_studies.experiments.constants.variant import (
     WRITTEN_OUT,
     Constant,
@@ -67,7 +67,8 @@ def test_a_changed_constant_changes_the_scenes_that_it_decides(variant, scenes):
     assert [one.value for one in force] == [2.0, 8.0]
     assert all(set(one.kinds) <= {"forces"} for one in force)
     unused = effects_of(named(variant, "SWIPE_MM"), variant, scenes, known)
-    assert changes_nothing(unused) and unused[0].used == 0
+    assert not any_change({"SWIPE_MM": unused}, named(variant, "SWIPE_MM"))
+    assert unused[0].used == 0
     assert baselines(variant, scenes[:1])[0].digest == known[0].digest  # the table's values again
 
 
@@ -87,13 +88,13 @@ def test_the_tables_rank_by_harm_and_fill_the_page(tmp_path):
     assert harm(bad) == pytest.approx(10.0) and harm(Effect(1.0, 0)) == 0.0
     effects = {one.name: [Effect(value, 3) for value in one.changed()] for one in constants}
     effects["LOST_US"] = [bad, bad]
-    tables = tables_of(constants, effects, "abc")
+    tables = tables_of(constants, effects, {"MAX_GAIN": ["force_f32"]}, "abc")
     most = next(one for one in tables if one.name == "most")
     assert most.rows[0][0] == "`LOST_US`" and len(most.rows) == 20
     facts = {"commit": "abc", "seconds": 60}
     outcome = ExperimentOutcome(tables, {}, {}, words_of(constants, effects, [], facts))
     text = fills_its_page(outcome, "constants", tmp_path)
-    assert "Commit abc" in text and "`MAX_ROW_GAIN`" in text
+    assert "| force |" in text and "Commit abc" in text and "`MAX_ROW_GAIN`" in text
 
 
 def test_scores_add_up():
