@@ -32,7 +32,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             measured presses are given.
     """
     began = time.process_time()
-    variant = build_variant(workspace.folder / "variant")
+    variant = build_variant(workspace.folder / "variant", checkout_root())
     scenes = _scenes(SceneMaker.of(workspace))
     known = baselines(variant, scenes)
     effects: dict[str, list[Effect]] = {}
