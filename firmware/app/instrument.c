@@ -51,13 +51,15 @@ void fw_instrument_init(fw_instrument *instrument, const fw_board *board)
     fw_send_info(&instrument->link, 0);
 }
 
-static void set_leds(const fw_instrument *instrument)
+static void set_leds(fw_instrument *instrument)
 {
     const fw_board *board = instrument->board;
     uint32_t leds = (fw_link_uptime_ms(&instrument->link) & ALIVE_MS) == 0 ? LED_ALIVE : 0;
     leds |= fw_solve_touched(&instrument->solve) ? LED_TOUCH : 0;
     leds |= fw_faults_raised(&instrument->safety) != 0 ? LED_FAULT : 0;
-    board->system->set_leds(board->system_ctx, leds);
+    if (leds != instrument->leds)
+        board->system->set_leds(board->system_ctx, leds);
+    instrument->leds = leds;
 }
 
 static bool process_frame(fw_instrument *instrument)

@@ -19,6 +19,7 @@ typedef struct fw_instrument {
     fw_acquire acquire;
     fw_solve solve;
     fw_host_link link;
+    uint32_t leds; /* as set; a board starts with all off */
 } fw_instrument;
 
 /* Switch on: open the newest model, start the scan if the owner lets current flow without a host,

@@ -178,7 +178,7 @@ def test_the_picture_is_drawn(tmp_path):
         (("--skip", "2"), "--skip goes with --protocol skip"),
         (("--skin", "SKIN", "--electrodes", "8"), "--electrodes 8: the skin .* has 16"),
         (("--skin", "SKIN", "--swap", "3"), "--swap 3: name two electrodes"),
-        (("--skin", "SKIN", "--drop-channels", "3,x"), "'x' is no whole number or range"),
+        (("--skin", "SKIN", "--drop-channels", "3,x"), "'x' is not an integer or range a:b"),
         (("--skin", "SKIN", "--truth-mask", "v", "--truth-mask-extent", "1,2"),
          "XMIN,YMIN,XMAX,YMAX"),
         (("--skin", "SKIN", "--touch", "1"), "X,Y or X,Y,RADIUS"),

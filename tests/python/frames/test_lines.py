@@ -119,7 +119,7 @@ def test_steps_of_columns_and_long_lists():
     for bad in ("1:8:0", "1:8:-1", "1:99:2"):
         with pytest.raises(UsageError, match="out of range"):
             chosen(bad, 10, (), "--columns")
-    with pytest.raises(UsageError, match=r"'x' is no number.*channel 0, .*\.\.\.$") as caught:
+    with pytest.raises(UsageError, match=r"'x' is not a number.*channel 0, .*\.\.\.$") as caught:
         chosen("x," * 500, 400, names, "--columns")
     assert len(str(caught.value)) < 700
 

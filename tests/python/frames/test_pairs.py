@@ -91,7 +91,7 @@ def test_a_header_that_says_half_is_asked_for_the_rest(tmp_path):
 
 def test_a_phase_is_never_taken_for_a_voltage(tmp_path):
     path = pair_table(tmp_path / "p.csv", np.abs(Z), np.angle(Z), DEGREES)
-    with pytest.raises(UsageError, match=r"column 'phase 0 \(deg\)' is a phase, no voltage"):
+    with pytest.raises(UsageError, match=r"column 'phase 0 \(deg\)' is a phase, not a voltage"):
         read(path)
     source = SourceOptions(columns="0:416:2", reference_frames="0:4", scale=1.0)
     options = ImportOptions(source=source, sign="magnitude")

@@ -166,9 +166,14 @@ def test_a_noisy_tare_raises_the_regularisation(storage, data_kind):
 
 
 def row_factors(log_sd: float) -> np.ndarray:
-    """A factor for each row (208,) of the paper's skin, the same for a row and its reciprocal."""
+    """A factor for each row (208,) of the paper's skin, the same for a row and its reciprocal;
+    their logarithms have the rms ``log_sd``, and leave the norm of the reference."""
     fold, factors = prebuilt()[0].fold, np.ones(208)
-    factors[fold.first] = np.exp(log_sd * np.random.default_rng(8).normal(size=104))
+    logs, norm = np.random.default_rng(8).normal(size=104), prebuilt()[0].v_ref_v.astype(float)
+    for _ in range(50):
+        logs = logs * log_sd / np.sqrt(np.mean(logs**2))
+        logs -= np.log(np.linalg.norm(norm * np.exp(logs)) / np.linalg.norm(norm))
+    factors[fold.first] = np.exp(logs)
     factors[fold.second] = factors[fold.first]
     return factors
 
@@ -178,6 +183,8 @@ def row_factors(log_sd: float) -> np.ndarray:
     [
         ("as it is", lambda v: v),
         ("an uneven skin", lambda v: v * row_factors(0.12)),
+        ("an uneven skin at the limit", lambda v: v * row_factors(0.27)),
+        ("another beyond the limit", lambda v: v * row_factors(0.29)),
         ("another instrument", lambda v: v * row_factors(0.4)),
         ("turned wires, another unit", lambda v: -1000 * v),
     ],

@@ -70,7 +70,7 @@ def test_good_presses_are_taken_with_the_frame_before(tmp_path):
 @pytest.mark.parametrize(
     ("bad", "why"),
     [
-        (lambda f: f.add(9, 1.0), "let go too early"),
+        (lambda f: f.add(9, 1.0), "released too early"),
         (lambda f: f.add(25, np.linspace(0.6, 1.6, 25)), "was not held"),
         (lambda f: f.add(13, 1.0, 0).add(12, 1.0, 5), "moved or slipped"),
     ],
@@ -92,7 +92,7 @@ def test_a_bad_press_is_asked_for_again(bad, why, tmp_path):
         (lambda f: f.add(5).add(25, 1.0, 5).add(20), "too early"),
         (lambda f: f.add(11).add(25, 1.0, 5).add(20), "too early"),
         (lambda f: f.add(5, 1.0, 5).add(230), "too early"),
-        (lambda f: f.add(20, 1.0, 5).add(500), "lifting was taken for it"),
+        (lambda f: f.add(20, 1.0, 5).add(500), "perhaps lifting was taken for a press"),
     ],
     ids=["before rest", "as rest ends", "lifted before rest", "lifted when told to press"],
 )
@@ -126,7 +126,7 @@ def test_begun_again_the_old_presses_stay_until_the_first_new_one(tmp_path):
     old, link = tmp_path / "old.npz", tmp_path / "p.npz"
     Finger().good(0).good(1).add(20).guided(old, 2)[0].close()
     link.symlink_to(old)
-    file = PressFile(link, plan_of(2), ROWS, "", anew=True)
+    file = PressFile(link, plan_of(2), ROWS, "", start_again=True)
     assert file.following == 0 and len(load_presses(old)) == 2
     file.add(1, np.ones(ROWS.n_rows), np.full(ROWS.n_rows, 2.0), 0.5)
     assert link.is_symlink() and np.array_equal(load_presses(old).place_mm, plan_of(2).place_mm[1:])
@@ -137,7 +137,7 @@ def test_presses_that_another_program_wrote_meanwhile_stay(tmp_path):
     path, frame = tmp_path / "p.npz", np.ones(ROWS.n_rows)
     files = [PressFile(path, plan_of(2), ROWS, "") for _ in range(2)]
     files[0].add(0, frame, 2 * frame, 0.0)
-    with pytest.raises(FileError, match="another program wrote it meanwhile"):
+    with pytest.raises(FileError, match="another program changed it meanwhile"):
         files[1].add(1, frame, 3 * frame, 0.0)
     files[0].add(1, frame, 2 * frame, 1.0)
     assert np.array_equal(load_presses(path).pressed, [2 * frame, 2 * frame])

@@ -141,9 +141,9 @@ def test_a_row_left_out_is_filled_in_by_every_engine_alike(taught):
 @pytest.mark.parametrize(
     ("change", "note"),
     [
-        (lambda p: replace(p, place_mm=p.place_mm * (1, -1)), "mirrored against the description"),
+        (lambda p: replace(p, place_mm=p.place_mm * (1, -1)), "mirrored relative to"),
         (lambda p: replace(p, place_mm=0.6 * p.place_mm), "0.62 times as large as described"),
-        (lambda p: p.take(p.place_mm[:, 0] > 0), "elsewhere the model is the physics' guess"),
+        (lambda p: p.take(p.place_mm[:, 0] > 0), "elsewhere the model is only an extrapolation"),
         (lambda p: shifted(p, 1), "as if one more came first"),
         pytest.param(
             lambda p: shifted(p, -3),

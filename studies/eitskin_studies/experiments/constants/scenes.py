@@ -285,7 +285,7 @@ def _left_out(worlds: Sequence[FrameScene], protocol: Protocol) -> Iterator[Fram
     """Rows that are masked: one, those of one electrode and of three."""
     pairs = protocol.drive_measure
     for electrodes in ((), (3,), (3, 4), (3, 8, 12)):
-        masked = np.isin(pairs, electrodes).any(axis=1)
+        masked = np.asarray(np.isin(pairs, electrodes).any(axis=1))
         masked[7] = True
         for kind in ("discs_1_to_3", "light_touches", "no_touch"):
             for one in [one for one in worlds if one.kind == kind][:2]:
