@@ -94,7 +94,7 @@ static eits_status check_rows(const eits_context *ctx, const eits_real *frame, u
 {
     *masked = count_unusable(ctx);
     if (*masked > ctx->options.max_masked)
-        return EITS_E_FRAME_CHANNELS;
+        return EITS_E_FRAME_ROWS;
     /* If every row is left out, which max_masked allowed, no reading is left that could be zero. */
     return *masked < ctx->model->n_rows && is_dead(ctx, frame) ? EITS_E_FRAME_ZERO : EITS_OK;
 }

@@ -91,10 +91,10 @@ static uint32_t add_result(eits_context *ctx, uint32_t sum)
     (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count);
     sum = eits_crc32(sum, touches, count * sizeof touches[0]);
     const eits_info *info = &ctx->info;
-    const eits_real told[] = {info->lambda,         info->lambda_noise, info->gap_rel,
-                              info->residual,       info->data_norm,    info->unexplained,
-                              info->model_mismatch, ctx->reference.gain};
-    return eits_crc32(sum, told, sizeof told);
+    const eits_real reported[] = {info->lambda,         info->lambda_noise, info->gap_rel,
+                                  info->residual,       info->data_norm,    info->unexplained,
+                                  info->model_mismatch, ctx->reference.gain};
+    return eits_crc32(sum, reported, sizeof reported);
 }
 
 static uint32_t run_trial(eits_context *ctx, const trial *t)

@@ -26,8 +26,8 @@ const char *eits_status_text(eits_status status)
         return "the model does not start at a 16-byte boundary";
     case EITS_E_FRAME_LENGTH:
         return "the frame's length is not the number of rows of the protocol";
-    case EITS_E_FRAME_CHANNELS:
-        return "too many channels of the frame are unusable";
+    case EITS_E_FRAME_ROWS:
+        return "too many rows of the frame are unusable";
     case EITS_E_FRAME_ZERO:
         return "all voltages are zero; is the skin driven and connected?";
     case EITS_E_NO_REFERENCE:
