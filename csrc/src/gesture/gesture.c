@@ -1,8 +1,9 @@
-/* Fingers out of tracked touches: which touch is which finger, when one lands, moves and lifts.
+/* Turn tracked touches into fingers: which touch belongs to which finger, and when a finger lands,
+ * moves and lifts.
  *
- * A tracker's ids are right nearly always. What it cannot know is made good here: a touch that is
- * missed in a frame or comes back under another id is the same finger; one that appears beside
- * another, or much fainter, is doubtful until it has lasted a while. */
+ * The tracker's ids are right nearly always. This file corrects the other cases: a touch that is
+ * missed in a frame or comes back under another id is the same finger; a touch that appears beside
+ * another, or is much fainter, is doubtful until it has lasted a while. */
 #include "gesture/one_finger.h"
 #include "gesture/plane.h"
 #include "gesture/two_fingers.h"
@@ -53,8 +54,8 @@ eits_status eits_gestures_init(eits_gestures *gestures, const eits_gesture_optio
         if (!eits_is_finite(reals[k]) || reals[k] < 0)
             return EITS_E_ARGUMENT;
     }
-    /* Checked first: with a NaN limit every comparison is false, and nothing would move or rejoin.
-     */
+    /* The options are checked first: with a NaN limit every comparison is false, and nothing would
+     * move or rejoin. */
     memset(gestures, 0, sizeof *gestures);
     gestures->options = chosen;
     return EITS_OK;
@@ -62,10 +63,10 @@ eits_status eits_gestures_init(eits_gestures *gestures, const eits_gesture_optio
 
 /* ---- which is which ---- */
 
-/* Whether a touch may still be this contact.
+/* Returns 1 if a touch may still belong to this contact.
  *
- * One that lifted may come back for rejoin_us, but only by a touch that was found: the tracker
- * holds touches by itself, and one that it holds shows nothing. */
+ * A contact that lifted may come back within rejoin_us, but only by a touch that was found in the
+ * frame: a touch that the tracker merely holds is no evidence of a finger. */
 static int can_match(const eits_gestures *g, const eits_contact *c, const eits_touch *touch)
 {
     if ((c->flags & CONTACT_SEEN) != 0 || c->state == CONTACT_NONE)
@@ -74,7 +75,7 @@ static int can_match(const eits_gestures *g, const eits_contact *c, const eits_t
            (touch->explained > 0 && g->time_us - c->seen_us <= g->options.rejoin_us);
 }
 
-/* The tracker's own word comes first: the contact that had this id, or NO_CONTACT. */
+/* The tracker's id has priority: returns the contact that had this id, or NO_CONTACT. */
 static uint32_t of_same_id(const eits_gestures *g, const eits_touch *touch)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
@@ -84,7 +85,8 @@ static uint32_t of_same_id(const eits_gestures *g, const eits_touch *touch)
     return NO_CONTACT;
 }
 
-/* The nearest contact that can match a touch that the tracker has given a new id. */
+/* Returns the nearest contact that the touch may belong to, if the tracker has given the touch a
+ * new id. */
 static uint32_t of_same_place(const eits_gestures *g, const eits_touch *touch)
 {
     eits_real nearest = g->options.rejoin_mm;
@@ -92,7 +94,7 @@ static uint32_t of_same_place(const eits_gestures *g, const eits_touch *touch)
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
         const eits_contact *c = &g->contact[k];
         const eits_real apart = eits_distance(touch->x_mm - c->x_mm, touch->y_mm - c->y_mm);
-        /* one that let go has lifted; only the tracker may know better */
+        /* a contact that was lifting has lifted; only the tracker's id may overrule this */
         const int lifted = c->state == CONTACT_LIFTED && (c->flags & CONTACT_GOING) != 0;
         if (!lifted && can_match(g, c, touch) && apart <= nearest) {
             nearest = apart;
@@ -102,9 +104,9 @@ static uint32_t of_same_place(const eits_gestures *g, const eits_touch *touch)
     return found;
 }
 
-/* A place for a new contact: an empty one, else that of the one that lifted first.
+/* Returns a place for a new contact: an empty one, else the place of the contact that lifted first.
  *
- * Lifted ones keep their place as long as it is not needed: they may come back. */
+ * Lifted contacts keep their place as long as it is not needed: they may come back. */
 static uint32_t free_place(const eits_gestures *g)
 {
     uint32_t found = NO_CONTACT, longest_us = 0;
@@ -124,27 +126,28 @@ static uint32_t free_place(const eits_gestures *g)
 
 /* ---- a finger's life ---- */
 
-/* Where it is; not in a frame in which it lets go: a scan that a finger lifts in shows it aside. */
+/* Note a contact's place, but not in a frame in which the finger lifts: such a scan shows the
+ * finger beside its true place. */
 static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch *touch)
 {
     const eits_real strength = eits_fabs(touch->strength_s_per_m_mm2);
     /* A scan in which a finger lifts has some rows with it and some without. Its strength falls,
-     * and its place moves aside: such a frame says that the finger is there, not where. */
+     * and its place moves aside: such a frame shows that the finger is there, but not its place. */
     const int firm = strength >= g->options.firm * c->strength;
     if (touch->explained > 0) {
         const int going = !firm || touch->explained < EITS_GOING * c->explained;
         c->flags = going ? c->flags | CONTACT_GOING : c->flags & ~(uint32_t)CONTACT_GOING;
         c->explained = touch->explained;
     } else if ((c->flags & CONTACT_GOING) != 0) {
-        return; /* the tracker holds it, but it was letting go: it has lifted */
+        return; /* the tracker holds it, but it was lifting: it has lifted */
     }
     c->touch_id = touch->id;
     c->seen_us = g->time_us;
     c->seen_x_mm = touch->x_mm;
     c->seen_y_mm = touch->y_mm;
     c->flags |= CONTACT_SEEN;
-    /* a faint one pulls the strength down slowly, so that a finger that eases off for long is firm
-     * again */
+    /* a faint touch lowers the noted strength slowly, so that a finger that presses less for long
+     * counts as firm again */
     c->strength = firm ? strength : c->strength + (strength - c->strength) * R(0.25);
     if (!firm || !(touch->explained > 0))
         return;
@@ -161,9 +164,9 @@ static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch
     c->farthest_mm = eits_larger(far, c->farthest_mm);
 }
 
-/* An event at where the contact is now; what moves from here on is measured from there.
+/* Report an event at the contact's place; later movement is measured from here.
  *
- * Steps add up from what was reported last: a slow finger is not lost between two frames. */
+ * Movement adds up from the place reported last, so that a slow finger is reported, too. */
 static void report_place(const eits_gestures *g, eits_contact *c, uint32_t kind, event_list *out)
 {
     c->reported_x_mm = c->x_mm;
@@ -175,7 +178,7 @@ static void report_place(const eits_gestures *g, eits_contact *c, uint32_t kind,
                                   .y_mm = c->y_mm});
 }
 
-/* From now on others know of it.
+/* Report that the contact is down.
  *
  * Until now it might have been noise, which would have lifted again at once. */
 static void land(const eits_gestures *g, eits_contact *c, event_list *out)
@@ -184,7 +187,8 @@ static void land(const eits_gestures *g, eits_contact *c, event_list *out)
     report_place(g, c, EITS_EVENT_DOWN, out);
 }
 
-/* A finger was in this frame: it goes on, or is found again after it seemed to have lifted. */
+/* Update a finger that this frame shows: it stays down, or it is found again after it seemed to
+ * have lifted. */
 static void go_on(eits_gestures *g, eits_contact *c, const eits_touch *touch, event_list *out)
 {
     note_place(g, c, touch);
@@ -199,9 +203,9 @@ static void go_on(eits_gestures *g, eits_contact *c, const eits_touch *touch, ev
         report_place(g, c, EITS_EVENT_MOVE, out);
 }
 
-/* Beside another that is down, or much fainter than the strongest.
+/* Returns 1 for a touch beside a contact that is down, or much fainter than one that is down.
  *
- * Both are what a solver makes of one clear touch: it comes apart, or leaves a ghost elsewhere. */
+ * A solver makes both of one clear touch: the touch splits, or it leaves a ghost elsewhere. */
 static int is_doubtful(const eits_gestures *g, const eits_touch *touch)
 {
     const eits_real strength = eits_fabs(touch->strength_s_per_m_mm2);
@@ -215,7 +219,8 @@ static int is_doubtful(const eits_gestures *g, const eits_touch *touch)
     return 0;
 }
 
-/* A touch that is no known finger's: new, and not reported before it has lasted. */
+/* Begin a contact for a touch that belongs to no known finger. It is not reported before it has
+ * lasted. */
 static void begin_contact(eits_gestures *g, const eits_touch *touch)
 {
     const uint32_t place = free_place(g);
@@ -233,14 +238,15 @@ static void begin_contact(eits_gestures *g, const eits_touch *touch)
 
 /* ---- a frame ---- */
 
-/* Touches may come over a link, where any bits may stand for a number. */
+/* Check a touch: it may come over a link, where the bits of a number may be anything. */
 static int is_touch(const eits_touch *touch)
 {
     return eits_is_place(touch->x_mm, touch->y_mm) && eits_is_finite(touch->strength_s_per_m_mm2);
 }
 
-/* Who is who in three rounds over all touches: first by id, then by place, what is left is new. In
- * rounds, so that a touch that keeps its id is never taken by another that came near. */
+/* Match touches and contacts in three rounds over all touches: first by id, then by place; the rest
+ * is new. The rounds make sure that a contact whose touch keeps its id is never taken by another
+ * touch that came near. */
 static void match(eits_gestures *g, const eits_touch *touches, uint32_t count, event_list *out)
 {
     uint8_t passed[EITS_MAX_TOUCHES] = {0};
@@ -264,7 +270,8 @@ static void match(eits_gestures *g, const eits_touch *touches, uint32_t count, e
     }
 }
 
-/* A finger beside another that is there as long is not alone; nor is one that landed beside it. */
+/* Mark each finger beside another that has been down for longer, or for at least doubt_us: it makes
+ * no gesture of one finger. */
 static void note_company(eits_gestures *g)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
@@ -280,7 +287,7 @@ static void note_company(eits_gestures *g)
     }
 }
 
-/* The pair ends first: its last event needs both fingers. */
+/* Lift a contact. Its pair ends first, since the pair's last event needs both fingers. */
 static void lift(eits_gestures *g, uint32_t place, event_list *out)
 {
     eits_contact *c = &g->contact[place];
@@ -289,8 +296,8 @@ static void lift(eits_gestures *g, uint32_t place, event_list *out)
     c->state = CONTACT_LIFTED;
 }
 
-/* A finger that is not found while a touch has just appeared near it is that touch: the tracker
- * lost it, as it does where one moves far within a frame. */
+/* If a finger is not found and a touch has just appeared near it, the finger is that touch: the
+ * tracker lost it, which happens when a finger moves far within a frame. Returns 1 in this case. */
 static int is_renamed(eits_gestures *g, eits_contact *c)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
@@ -308,7 +315,7 @@ static int is_renamed(eits_gestures *g, eits_contact *c)
         other->state = CONTACT_NONE;
         if (g->time_us - c->born_us > 2 * g->options.doubt_us || (c->flags & CONTACT_GOING) != 0)
             return 1;
-        /* just landed: the first touch was none */
+        /* the finger has just landed, and its first touch was false */
         c->start_x_mm = c->x_mm;
         c->start_y_mm = c->y_mm;
         c->farthest_mm = 0;
@@ -317,7 +324,8 @@ static int is_renamed(eits_gestures *g, eits_contact *c)
     return 0;
 }
 
-/* Those that no touch was found for: renamed, lifted after lost_us, forgotten after rejoin_us. */
+/* Contacts without a touch in this frame are renamed, lifted after lost_us, and forgotten after
+ * rejoin_us. */
 static void end_lost(eits_gestures *g, event_list *out)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
@@ -335,13 +343,13 @@ static void end_lost(eits_gestures *g, event_list *out)
     }
 }
 
-/* All lift, and nothing is made of it. */
+/* Lift all contacts without reporting a gesture. */
 static void begin_again(eits_gestures *g, event_list *out)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
         if (g->contact[k].state == CONTACT_DOWN)
             lift(g, k, out);
-        /* forgotten, so that no tap or hold is made of the time that nobody saw */
+        /* contacts are forgotten, so that no tap or hold is made of the unobserved time */
         g->contact[k] = (eits_contact){0};
     }
     g->pair = (eits_finger_pair){0};
@@ -359,16 +367,16 @@ eits_status eits_gestures_update(eits_gestures *gestures, const eits_touch *touc
     event_list out = {.events = events, .room = room, .dropped = &g->dropped};
     const uint32_t elapsed_us = time_us - g->time_us;
     *reported = 0;
-    /* The same frame twice says nothing new. A clock that goes back is a long gap, as unsigned
-     * numbers have it, and so is treated as one. */
+    /* A repeated frame is ignored. A clock that goes back is, in unsigned numbers, a long gap, and
+     * is treated as one. */
     if (g->begun && elapsed_us == 0)
         return EITS_OK;
     if (g->begun && elapsed_us > EITS_LONGEST_GAP_US)
         begin_again(g, &out);
     g->time_us = time_us;
     g->begun = 1;
-    /* Who is who before who has lifted: a finger under a new id is found before its old one ends.
-     * Pairs and holds last, since both look at what is left. */
+    /* Touches are matched before contacts lift, so that a finger under a new id is found before its
+     * old contact ends. Pairs and holds come last, since both look at the contacts that remain. */
     match(g, touches, count, &out);
     note_company(g);
     end_lost(g, &out);

@@ -1,10 +1,10 @@
-/* Tap, double tap, hold, swipe: what a finger by itself did. */
+/* Tap, double tap, hold and swipe: the gestures of a single finger. */
 #include "gesture/one_finger.h"
 
 #include "gesture/plane.h"
 
-/* Where it landed: a finger that lifts pulls its place aside, and what was tapped is where it was
- * put. */
+/* Events carry the place at which the finger landed: a finger that lifts shifts its measured place,
+ * and the user tapped where the finger was put down. */
 static eits_event event_at(const eits_gestures *g, const eits_contact *c, uint32_t kind)
 {
     return (eits_event){.kind = kind,
@@ -14,8 +14,8 @@ static eits_event event_at(const eits_gestures *g, const eits_contact *c, uint32
                         .y_mm = c->start_y_mm};
 }
 
-/* The first tap was reported at once and is not taken back: to wait for a second one would make
- * every tap late. */
+/* Report a tap or a double tap. The first tap is reported at once and is not taken back: waiting
+ * for a second one would delay every tap. */
 static void tap(eits_gestures *g, eits_contact *c, event_list *out)
 {
     const int again = g->tapped && c->born_us - g->tap_us <= g->options.double_us &&
@@ -23,15 +23,16 @@ static void tap(eits_gestures *g, eits_contact *c, event_list *out)
                           g->options.double_mm;
     eits_report(out, event_at(g, c, again ? EITS_EVENT_DOUBLE_TAP : EITS_EVENT_TAP));
     c->flags |= CONTACT_TAPPED;
-    g->tapped = !again; /* a third tap is a first one */
+    g->tapped = !again; /* a third tap begins a new pair */
     g->tap_us = c->seen_us;
     g->tap_x_mm = c->start_x_mm;
     g->tap_y_mm = c->start_y_mm;
 }
 
-/* Its speed over the last speed_us, or over as much as is known; mm/s.
+/* Returns the finger's speed over the last speed_us, or over the known time if that is shorter;
+ * mm/s.
  *
- * Times differ as unsigned numbers, so that the board's clock may wrap. */
+ * Times are subtracted as unsigned numbers, so that the board's clock may wrap. */
 static eits_real last_speed(const eits_gestures *g, const eits_contact *c)
 {
     const uint32_t known = c->trail_count < EITS_TRAIL ? c->trail_count : EITS_TRAIL;
@@ -44,7 +45,7 @@ static eits_real last_speed(const eits_gestures *g, const eits_contact *c)
         at = before;
     }
     const uint32_t span_us = last_us - c->trail_us[at];
-    /* one point, or two in one instant: no speed is known, and none is no swipe */
+    /* with one point, or two at one instant, the speed is unknown; 0 then makes it no swipe */
     if (span_us == 0)
         return 0;
     return eits_distance(c->x_mm - c->trail_x_mm[at], c->y_mm - c->trail_y_mm[at]) /
@@ -69,7 +70,8 @@ static int is_swipe(const eits_gestures *g, eits_contact *c, eits_real dx, eits_
     return 1;
 }
 
-/* A quick one is over before three frames show it; then the one in which it lets go counts too. */
+/* Report a swipe. A quick swipe is over before three frames show it; then the frame in which the
+ * finger lifts counts, too. */
 static void swipe(const eits_gestures *g, eits_contact *c, event_list *out)
 {
     const uint32_t last_us = c->trail_us[(c->trail_count - 1) % EITS_TRAIL];
@@ -80,8 +82,8 @@ static void swipe(const eits_gestures *g, eits_contact *c, event_list *out)
                        going_mm / ((eits_real)(c->seen_us - last_us) * R(1e-6)), out);
 }
 
-/* Another finger came no later and was there as long: this one is not alone, or is what the other's
- * landing looked like. */
+/* Returns 1 if another finger came no later and stayed at least as long: then this one is not
+ * alone, or is an artefact of the other's landing. */
 static int is_outlived(const eits_gestures *g, const eits_contact *c)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
@@ -110,8 +112,8 @@ void eits_lifted(eits_gestures *g, eits_contact *c, event_list *out)
         swipe(g, c, out);
 }
 
-/* Reported while the finger is down, since the one who holds waits for it; hence in a step of its
- * own, also in frames in which nothing has changed. */
+/* A hold is reported while the finger is down, since the user waits for it. It therefore has a step
+ * of its own, which also runs for frames in which nothing has changed. */
 void eits_hold(eits_gestures *g, event_list *out)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {

@@ -1,7 +1,7 @@
 #include "gesture/plane.h"
 
-/* atan of 0 to 1 by Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.47: within 1e-5
- * rad. */
+/* Returns atan(t) in degrees for t from 0 to 1, by Abramowitz and Stegun, Handbook of Mathematical
+ * Functions, 4.4.47: within 1e-5 rad. */
 static eits_real angle_of_slope(eits_real t)
 {
     const eits_real s = t * t;

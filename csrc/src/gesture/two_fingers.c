@@ -1,27 +1,29 @@
-/* Pinch, spread, rotate: what two fingers do together.
+/* Pinch, spread and rotate: the gestures of two fingers.
  *
- * Both have moved when the distance between them has changed, or one has gone round the other: the
- * longer of the two ways says what it is. A pinch that opens again becomes a spread. */
+ * A gesture begins when the distance between the fingers has changed enough, or one has gone far
+ * enough round the other. The longer of these two ways decides which gesture it is. A pinch that
+ * opens again becomes a spread. */
 #include "gesture/two_fingers.h"
 
 #include "gesture/plane.h"
 
-/* Down, seen now, and there for long enough to say where it landed. */
+/* Returns 1 for a contact that is down, seen in this frame, and there for long enough that its
+ * landing place is known. */
 static int is_settled(const eits_gestures *g, const eits_contact *c)
 {
     return c->state == CONTACT_DOWN && (c->flags & CONTACT_SEEN) != 0 &&
            g->time_us - c->born_us >= g->options.settle_us;
 }
 
-/* Between two fingers; never 0, for it divides. */
+/* Returns the distance between two fingers; never 0, since the caller divides by it. */
 static eits_real distance(eits_real dx_mm, eits_real dy_mm)
 {
     const eits_real apart = eits_distance(dx_mm, dy_mm);
     return apart > EITS_MIN_APART_MM ? apart : EITS_MIN_APART_MM;
 }
 
-/* The value is that of the last frame in which both were seen, also at the end: by then one of them
- * lifts, and its place is worth nothing. */
+/* Report a pair's event. The value is that of the last frame in which both fingers were seen, also
+ * at the end: by then one of them lifts, and its place is unreliable. */
 static void report_pair(const eits_gestures *g, uint32_t phase, event_list *out)
 {
     const eits_finger_pair *p = &g->pair;
@@ -38,7 +40,7 @@ static void report_pair(const eits_gestures *g, uint32_t phase, event_list *out)
                                                                         : apart / p->base_mm});
 }
 
-/* Two fingers and no third: they may begin something.
+/* Begin a pair if exactly two fingers are settled.
  *
  * With a third finger it is unknown which two belong together. */
 static void look_for_pair(eits_gestures *g)
@@ -67,8 +69,8 @@ static void look_for_pair(eits_gestures *g)
                                  .extreme_mm = apart};
 }
 
-/* From here on changes are measured from what was reported last, so that a slow gesture is reported
- * as often as a quick one of the same way. */
+/* Begin a gesture. Changes are measured from the value reported last, so that a slow gesture is
+ * reported as often as a quick one of the same length. */
 static void begin_kind(eits_gestures *g, uint32_t kind, eits_real apart_mm, event_list *out)
 {
     eits_finger_pair *p = &g->pair;
@@ -78,14 +80,14 @@ static void begin_kind(eits_gestures *g, uint32_t kind, eits_real apart_mm, even
     report_pair(g, EITS_PHASE_BEGIN, out);
 }
 
-/* The way that one finger went about the other, mm, for so many degrees. */
+/* Returns the way in mm of one finger round the other, for an angle in degrees. */
 static eits_real way_round(eits_real degrees, eits_real apart_mm)
 {
     return eits_fabs(degrees) * R(0.017453292519943295) * apart_mm;
 }
 
-/* Both ways in mm, so that one threshold serves: in degrees, fingers that are near each other would
- * turn by noise alone. */
+/* Both ways are compared in mm, so that one threshold serves: in degrees, noise alone would turn
+ * fingers that are near each other. */
 static void recognise(eits_gestures *g, eits_real apart_mm, event_list *out)
 {
     const eits_finger_pair *p = &g->pair;
@@ -104,8 +106,8 @@ static void go_on(eits_gestures *g, eits_real apart_mm, event_list *out)
 {
     eits_finger_pair *p = &g->pair;
     const int pinch = p->kind == EITS_EVENT_PINCH, rotate = p->kind == EITS_EVENT_ROTATE;
-    /* back from the farthest point, not from the start: a wide pinch may open a little and still be
-     * one */
+    /* the way back is measured from the farthest point, not from the start: a wide pinch may open a
+     * little and still be a pinch */
     const eits_real back = pinch ? apart_mm - p->extreme_mm : p->extreme_mm - apart_mm;
     if (!rotate && back >= g->options.pair_mm) {
         report_pair(g, EITS_PHASE_END, out);
@@ -124,7 +126,8 @@ static void go_on(eits_gestures *g, eits_real apart_mm, event_list *out)
     report_pair(g, EITS_PHASE_CHANGE, out);
 }
 
-/* A finger was lost for a frame and found again: they go on. */
+/* Continue a gesture whose finger was lost for a frame and found again. Returns 1 if there is one.
+ */
 static int take_up(eits_gestures *g)
 {
     eits_finger_pair *p = &g->pair;
@@ -142,16 +145,16 @@ void eits_pair_step(eits_gestures *g, event_list *out)
         return;
     }
     const eits_contact *first = &g->contact[p->first], *second = &g->contact[p->second];
-    /* A finger that was missed has its old place, which would be half of a movement. */
+    /* A finger that was missed still has its old place; using it would show half of a movement. */
     if ((first->flags & second->flags & CONTACT_SEEN) == 0)
         return;
     const eits_real dx = second->x_mm - first->x_mm, dy = second->y_mm - first->y_mm;
     if (((first->flags | second->flags) & CONTACT_RENAMED) != 0 && p->kind == 0) {
-        p->on = 0; /* where they began is not known */
+        p->on = 0; /* the fingers' starting places are unknown */
         return;
     }
-    /* Cross and dot product of the last line and this one: the small angle between the two, which
-     * adds up beyond 180 degrees, where an angle from the x axis would jump. */
+    /* Cross and dot product of the last line and this one give the small angle between them. Small
+     * angles add up beyond 180 degrees; an angle from the x axis would jump there. */
     p->turned_deg += eits_angle_deg(p->dx_mm * dy - p->dy_mm * dx, p->dx_mm * dx + p->dy_mm * dy);
     p->dx_mm = dx;
     p->dy_mm = dy;

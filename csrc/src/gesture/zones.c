@@ -1,10 +1,11 @@
-/* Presses of zones: where each finger is, with a border that a finger at rest does not cross. */
+/* Presses of zones: find the zone of each finger, with a margin that a finger at rest does not
+ * cross. */
 #include "eitskin/zone.h"
 #include "gesture/contacts.h"
 #include "gesture/plane.h"
 
-/* Outside, if only just: a place on the border that is not inside may not have the distance 0,
- * which means inside. */
+/* A place on the border that is not inside must not have the distance 0, which means inside; it
+ * gets a small one. */
 static eits_real some(eits_real distance)
 {
     return distance > R(1e-6) ? distance : R(1e-6);
@@ -32,7 +33,7 @@ eits_status eits_zones_init(eits_zones *zones, const eits_zone *zone, uint32_t c
             return EITS_E_ARGUMENT;
     }
     memset(zones, 0, sizeof *zones);
-    /* in place: the corners stay the caller's, and cost no memory here */
+    /* the corners stay in the caller's memory and cost none here */
     zones->zone = zone;
     zones->count = count;
     return EITS_OK;
@@ -40,20 +41,21 @@ eits_status eits_zones_init(eits_zones *zones, const eits_zone *zone, uint32_t c
 
 /* ---- where a place lies ---- */
 
-/* From (x, y) to the nearest point of the segment. */
+/* Returns the distance from (x, y) to the nearest point of the segment. */
 static eits_real distance_to_edge(const eits_real *from, const eits_real *to, eits_real x,
                                   eits_real y)
 {
     const eits_real ex = to[0] - from[0], ey = to[1] - from[1];
     const eits_real along = (x - from[0]) * ex + (y - from[1]) * ey, square = ex * ex + ey * ey;
     eits_real part = square > 0 ? along / square : 0;
-    /* beyond either end the end itself is nearest; a segment without length is its first point */
+    /* beyond either end, the end itself is nearest; a segment without length is its first point */
     part = part > 0 ? (part < 1 ? part : 1) : 0;
     return eits_distance(x - (from[0] + part * ex), y - (from[1] + part * ey));
 }
 
-/* How far outside the polygon; 0 inside. A place on an edge that two polygons share is in one of
- * them: edges are taken from their lower end, whichever way round they are listed. */
+/* Returns the distance to the polygon from outside; 0 inside. A place on an edge that two polygons
+ * share is in exactly one of them: edges are taken from their lower end, whichever way round they
+ * are listed. */
 static eits_real outside_polygon(const eits_zone *z, eits_real x, eits_real y)
 {
     eits_real nearest = -1;
@@ -71,7 +73,8 @@ static eits_real outside_polygon(const eits_zone *z, eits_real x, eits_real y)
     return inside ? 0 : some(nearest);
 }
 
-/* 0 inside; a place on a ring's inner border is in it, one on the outer border is not. */
+/* Returns the distance to the zone from outside; 0 inside. A place on a ring's inner border is in
+ * the ring, one on the outer border is not. */
 static eits_real outside(const eits_zone *z, eits_real x, eits_real y)
 {
     if (z->corners_mm != NULL)
@@ -82,11 +85,12 @@ static eits_real outside(const eits_zone *z, eits_real x, eits_real y)
     return from < z->inner_mm ? some(z->inner_mm - from) : 0;
 }
 
-/* The zone, from 1, that a finger is in, where it was in `before`; 0: in none. */
+/* Returns the number, from 1, of the zone that a finger is in, or 0 if it is in none. `before` is
+ * the zone that it was in. */
 static uint32_t zone_at(const eits_zones *zones, uint32_t before, eits_real x, eits_real y)
 {
-    /* A finger at a border moves by the noise of its place: without this it would press and release
-     * a key with every frame. */
+    /* A finger at a border moves by the noise of its place: without this margin it would press and
+     * release a key with every frame. */
     if (before != 0 && outside(&zones->zone[before - 1], x, y) <= EITS_ZONE_STAY_MM)
         return before;
     for (uint32_t k = 0; k < zones->count; ++k) {
@@ -98,8 +102,8 @@ static uint32_t zone_at(const eits_zones *zones, uint32_t before, eits_real x, e
 
 /* ---- fingers ---- */
 
-/* The finger's place, else an empty one, else EITS_MAX_CONTACTS, which the caller counts as
- * dropped: no finger that is down loses its place to another. */
+/* Returns the finger's entry, else an empty one, else EITS_MAX_CONTACTS, which the caller counts as
+ * dropped: no finger that is down loses its entry to another. */
 static uint32_t finger_of(eits_zones *zones, uint32_t id)
 {
     uint32_t empty = EITS_MAX_CONTACTS;
@@ -112,8 +116,8 @@ static uint32_t finger_of(eits_zones *zones, uint32_t id)
     return empty;
 }
 
-/* An event of a zone is the finger's own event with the zone's name. On a ring it says where as
- * well, as part of a turn counterclockwise from x, for dials. */
+/* Report the finger's own event with the zone's name. On a ring the event also carries the angle,
+ * as part of a turn counterclockwise from x, for dials. */
 static void report_zone(const eits_zones *zones, const eits_event *cause, uint32_t kind,
                         uint32_t phase, uint32_t zone, event_list *out)
 {
@@ -130,7 +134,7 @@ static void report_zone(const eits_zones *zones, const eits_event *cause, uint32
     eits_report(out, event);
 }
 
-/* A finger has left: the zone is released, or is another's that is in it. */
+/* A finger has left: release the zone, or give it to another finger that is in it. */
 static void leave(eits_zones *zones, uint32_t place, const eits_event *cause, event_list *out)
 {
     const uint32_t zone = zones->finger[place].zone, id = zones->finger[place].id;
@@ -146,7 +150,8 @@ static void leave(eits_zones *zones, uint32_t place, const eits_event *cause, ev
         report_zone(zones, cause, EITS_EVENT_RELEASE, EITS_PHASE_ONCE, zone, out);
 }
 
-/* A second finger in a pressed zone presses nothing: whoever presses keys wants one event. */
+/* Enter a zone. A second finger in a pressed zone presses nothing: a key press must give one event.
+ */
 static void enter(eits_zones *zones, uint32_t place, uint32_t zone, const eits_event *cause,
                   event_list *out)
 {
@@ -157,7 +162,8 @@ static void enter(eits_zones *zones, uint32_t place, uint32_t zone, const eits_e
     report_zone(zones, cause, EITS_EVENT_PRESS, EITS_PHASE_BEGIN, zone, out);
 }
 
-/* Leave before enter, so that a finger that slides never holds two zones. */
+/* A finger leaves a zone before it enters another, so that a finger that slides never holds two
+ * zones. */
 static void move(eits_zones *zones, const eits_event *event, event_list *out)
 {
     const uint32_t place = finger_of(zones, event->first_id);
