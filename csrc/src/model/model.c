@@ -1,5 +1,4 @@
-/* Opening an .eitm model in place. Every length, offset and index is checked before it is followed.
- */
+/* Open an .eitm model in place. Every length, offset and index is checked before it is followed. */
 #include "eitskin/model.h"
 #include "eitskin/solve.h"
 
@@ -22,8 +21,8 @@ typedef struct sections {
         force, whit, unce, geom, move, prec, plac, ordr, sums;
 } sections;
 
-/* By memcpy: a cast would read through a pointer of another type, and entries of the header need
- * not lie at a word's boundary. Compilers make one load of it. */
+/* memcpy is used since a cast would read through a pointer of another type, and entries of the
+ * header need not lie at a word's boundary. Compilers make one load of it. */
 static uint32_t read_u32(const uint8_t *bytes)
 {
     uint32_t value;
@@ -38,8 +37,8 @@ static uint16_t read_u16(const uint8_t *bytes)
     return value;
 }
 
-/* A NaN or infinity in one number spreads to every pixel by the products, where no later check
- * could say what it came from. */
+/* Numbers must be finite: the products spread one NaN or infinity to every pixel, and no later
+ * check could name its source. */
 static int all_finite(const float *values, size_t count)
 {
     for (size_t i = 0; i < count; ++i) {
@@ -51,8 +50,8 @@ static int all_finite(const float *values, size_t count)
 
 uint32_t eits_crc32(uint32_t crc, const void *bytes, size_t size)
 {
-    /* four bits at a time: a table of 16 words is small enough for flash and fast enough for a
-     * model */
+    /* the loop takes four bits at a time: a table of 16 words is small enough for flash and fast
+     * enough for a model */
     static const uint32_t table[16] = {
         0x00000000u, 0x1DB71064u, 0x3B6E20C8u, 0x26D930ACu, 0x76DC4190u, 0x6B6B51F4u,
         0x4DB26158u, 0x5005713Cu, 0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu,
@@ -70,8 +69,8 @@ uint32_t eits_crc32(uint32_t crc, const void *bytes, size_t size)
 
 uint64_t eits_protocol_hash(uint32_t n_electrodes, uint32_t n_rows, const uint8_t *table)
 {
-    /* The counts first: tables that are the head of one another have different hashes. Byte by
-     * byte, so that a big-endian writer would make the same number. */
+    /* The counts are hashed first: a table that begins like another one then has a different hash.
+     * They are hashed byte by byte, so that a big-endian writer makes the same number. */
     const uint8_t head[4] = {(uint8_t)n_electrodes, (uint8_t)(n_electrodes >> 8), (uint8_t)n_rows,
                              (uint8_t)(n_rows >> 8)};
     uint64_t hash = 0xCBF29CE484222325u;
@@ -82,8 +81,9 @@ uint64_t eits_protocol_hash(uint32_t n_electrodes, uint32_t n_rows, const uint8_
     return hash;
 }
 
-/* Magic, version, length, checksum, in this order: each is said only where those before hold, so
- * that a text file is not reported as damaged, nor a newer format as one with a wrong checksum. */
+/* Magic, version, length and checksum are checked in this order, and each is reported only if those
+ * before hold: a text file is not reported as damaged, nor a newer format as one with a wrong
+ * checksum. */
 static eits_status check_header(const uint8_t *bytes, size_t size)
 {
     if (size < 4 || memcmp(bytes, "EITM", 4) != 0)
@@ -103,7 +103,7 @@ static eits_status check_header(const uint8_t *bytes, size_t size)
     return EITS_OK;
 }
 
-/* By tag, in any order: a writer may put sections where it likes. */
+/* Sections are found by tag, since a writer may put them in any order. */
 static eits_section *find_slot(sections *found, const uint8_t *tag)
 {
     static const char tags[] =
@@ -120,9 +120,9 @@ static eits_section *find_slot(sections *found, const uint8_t *tag)
     return NULL;
 }
 
-/* An offset is compared with the total first and the size with what is left behind it: their sum
- * could pass 2^32 and look small. The count is limited for the same reason, before it is
- * multiplied. */
+/* The offset is compared with the total first, and the size with the bytes behind the offset: the
+ * sum of both could pass 2^32 and look small. The count is limited for the same reason, before it
+ * is multiplied. */
 static eits_status read_table(sections *found, const uint8_t *bytes)
 {
     const uint32_t total = read_u32(bytes + 8);
@@ -140,11 +140,11 @@ static eits_status read_table(sections *found, const uint8_t *bytes)
         eits_section *slot = find_slot(found, entry);
         if (slot == NULL) {
             if (required)
-                /* a later minor version may not add what older readers must know */
+                /* a later minor version must not add a section that older readers must know */
                 return EITS_E_MODEL_VERSION;
             continue;
         }
-        /* Twice the same tag: which one holds would depend on the reader. */
+        /* A tag must not occur twice: the section in force would depend on the reader. */
         if (slot->data != NULL)
             return EITS_E_MODEL_SECTION;
         slot->data = bytes + offset;
@@ -158,7 +158,7 @@ static int has_size(const eits_section *s, size_t size)
     return s->data != NULL && s->size == size;
 }
 
-/* With these bounds every size of check_sizes is below 2^30, so that none wraps where size_t has 32
+/* With these bounds every size in check_sizes is below 2^30, so that none wraps if size_t has 32
  * bits. */
 static eits_status read_dims(eits_model *model, const eits_section *dims)
 {
@@ -190,7 +190,7 @@ static eits_status read_dims(eits_model *model, const eits_section *dims)
         return EITS_E_MODEL_VALUE;
     const float numbers[] = {model->pixel_mm,  model->origin_x_mm, model->origin_y_mm,
                              model->current_a, model->lipschitz,   model->noise_gain};
-    /* the inverse of the Lipschitz constant must be a number */
+    /* the inverse of the Lipschitz constant must be finite */
     if (!all_finite(numbers, sizeof numbers / sizeof numbers[0]) || model->pixel_mm <= 0.0f ||
         model->lipschitz < 0x1p-126f || model->current_a <= 0.0f || model->noise_gain < 0.0f)
         return EITS_E_MODEL_VALUE;
@@ -206,8 +206,8 @@ static eits_status read_dims(eits_model *model, const eits_section *dims)
     return EITS_OK;
 }
 
-/* Each section has exactly the bytes that the dimensions ask for. After this a pointer into it may
- * be followed to the end of its array without another look at the file. */
+/* Each section must have exactly the bytes that the dimensions ask for. After this check a pointer
+ * into it may be followed to the end of its array without another look at the file. */
 static eits_status check_sizes(const eits_model *model, const sections *found)
 {
     static const uint8_t item_size[] = {4, 2, 2, 1};
@@ -230,15 +230,14 @@ static eits_status check_sizes(const eits_model *model, const sections *found)
 
 static eits_status check_tables(const eits_model *model)
 {
-    /* pair by pair: drive, then measurement */
+    /* each row has two pairs: drive, then measurement */
     for (size_t i = 0; i < (size_t)model->n_rows * 4; i += 2) {
         const uint8_t *pair = model->protocol + i;
         if (pair[0] >= model->n_electrodes || pair[1] >= model->n_electrodes || pair[0] == pair[1])
             return EITS_E_MODEL_VALUE;
     }
     for (uint32_t i = 0; i < model->n_folded; ++i) {
-        /* sign is a factor: another number than 1 or -1 would scale a row without anyone noticing
-         */
+        /* the sign is used as a factor: a number other than 1 or -1 would scale a row silently */
         const eits_fold fold = model->fold[i];
         if (fold.first >= model->n_rows ||
             (fold.second != EITS_FOLD_NONE && fold.second >= model->n_rows) ||
@@ -249,8 +248,8 @@ static eits_status check_tables(const eits_model *model)
         const eits_pixel at = model->pixel[j];
         if (at.ix >= model->nx || at.iy >= model->ny)
             return EITS_E_MODEL_VALUE;
-        /* Ascending, so that no two pixels share a cell of the image and a walk over the kept ones
-         * is a walk over the raster. */
+        /* Cells must ascend, so that no two pixels share a cell of the image and a walk over the
+         * kept pixels is a walk over the raster. */
         if (j > 0) {
             const eits_pixel before = model->pixel[j - 1];
             if (at.iy < before.iy || (at.iy == before.iy && at.ix <= before.ix))
@@ -263,7 +262,8 @@ static eits_status check_tables(const eits_model *model)
                : EITS_E_MODEL_VALUE;
 }
 
-/* All bits of the exponent set: infinite or NaN, found without converting the number. */
+/* A half with all bits of the exponent set is infinite or NaN; this is found without converting the
+ * number. */
 static int halves_finite(const uint16_t *values, size_t count)
 {
     for (size_t i = 0; i < count; ++i) {
@@ -273,7 +273,7 @@ static int halves_finite(const uint16_t *values, size_t count)
     return 1;
 }
 
-/* A model's own defaults are always good options. */
+/* Returns 1 if the model's own defaults are valid options. */
 static int defaults_in_range(const eits_model *model)
 {
     const eits_defaults *d = model->defaults;
@@ -286,7 +286,7 @@ static int defaults_in_range(const eits_model *model)
            eits_between(d->mask_threshold, 0, 1) && eits_options_in_range(&own);
 }
 
-/* Integers of storage need no look: each is a number. Their scales do. */
+/* Integers of storage need no check, since each is a number. Their scales do. */
 static eits_status check_numbers(const eits_model *model)
 {
     const eits_matrix *s = &model->sensitivity;
@@ -304,14 +304,14 @@ static eits_status check_numbers(const eits_model *model)
     return EITS_OK;
 }
 
-/* Section FLDS, where there is one: two numbers, then halves. */
+/* Read section FLDS, if the model has one: two numbers, then halves. */
 static eits_status read_fields(eits_model *model, const eits_section *flds)
 {
     if (flds->data == NULL)
         return EITS_OK;
     const uint32_t rows = 2u * model->n_electrodes + MIRROR_ROWS, stride = (rows + 7u) & ~7u;
     const size_t halves = (size_t)model->n_pixels * stride;
-    /* without it (other data than differences) touches are fitted as if they did not interact */
+    /* without it (data other than differences), touches are fitted as if they did not interact */
     if (flds->size != FIELDS_HEAD + halves * 2u)
         return EITS_E_MODEL_SECTION;
     model->fields.volts = eits_read_f32(flds->data);
@@ -328,7 +328,8 @@ static eits_status read_fields(eits_model *model, const eits_section *flds)
     return EITS_OK;
 }
 
-/* Section SUMS: what made them, then one word a frame. Those of another core say nothing here. */
+/* Read section SUMS: the self-test revision that made it, then one word per frame. Sums of another
+ * revision cannot be compared and are ignored. */
 static eits_status read_sums(eits_golden *golden, const eits_section *found)
 {
     if (found->data == NULL)
@@ -341,8 +342,8 @@ static eits_status read_sums(eits_golden *golden, const eits_section *found)
     return EITS_OK;
 }
 
-/* Nothing is copied. Sections begin at multiples of 16 bytes of a blob that does, so that these
- * casts give aligned pointers to any type. */
+/* Point into the blob; nothing is copied. Sections begin at multiples of 16 bytes of a blob that
+ * does, too, so that these casts give aligned pointers to any type. */
 static void point_into(eits_model *model, const sections *found)
 {
     model->protocol = found->prot.data;
@@ -368,7 +369,8 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
     if ((uintptr_t)blob % EITS_MODEL_ALIGNMENT != 0)
         return EITS_E_MODEL_ALIGNMENT;
     const uint8_t *bytes = blob;
-    /* Opened on the side: where anything fails, the caller's model is as it was. */
+    /* The model is opened into a local struct: if anything fails, the caller's model is unchanged.
+     */
     eits_model opened = {0};
     sections found = {0};
     eits_status status = check_header(bytes, size);
@@ -380,7 +382,7 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
         status = check_sizes(&opened, &found);
     if (status != EITS_OK)
         return status;
-    /* what the header claims; check_tables compares it with the table itself */
+    /* the hash in the header; check_tables compares it with the table itself */
     memcpy(&opened.protocol_hash, bytes + 24, sizeof opened.protocol_hash);
     point_into(&opened, &found);
     status = check_tables(&opened);

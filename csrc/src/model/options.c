@@ -1,5 +1,5 @@
-/* Options: a model's own, those for a stream, and whether options are in range. Names, ranges and
- * default values come from tables/options.toml. */
+/* Get a model's own options and those for a stream, and check that options are in range. Names,
+ * ranges and default values come from tables/options.toml. */
 #include "model/options.h"
 
 #include "base/vec.h"
@@ -21,15 +21,15 @@ eits_status eits_options_default(const eits_model *model, eits_options *options)
         return EITS_E_ARGUMENT;
     const eits_defaults *d = model->defaults;
     *options = usual_options(d);
-    /* A model may name more touches than this build holds: its defaults are good options all the
-     * same. */
+    /* A model may ask for more touches than this build holds; its other defaults are still valid.
+     */
     options->max_touches = d->max_touches < EITS_MAX_TOUCHES ? d->max_touches : EITS_MAX_TOUCHES;
     options->max_masked = model->n_rows / 2;
     options->touch_fit = EITS_TOUCH_FIT_ALL & ~d->touch_fit_left_out;
     options->project_reference = (d->touch_fit_left_out & EITS_GAIN_DRIFT_KEPT) == 0;
     options->reference_frames =
         (d->touch_fit_left_out & EITS_TRACKS_REFERENCE) != 0 ? EITS_REFERENCE_TRACKING_FRAMES : 0;
-    options->touch_seek = !options->project_reference; /* in a taught model */
+    options->touch_seek = !options->project_reference; /* 1 for a taught model */
     return EITS_OK;
 }
 
@@ -37,8 +37,8 @@ eits_status eits_options_track(eits_options *options)
 {
     if (options == NULL)
         return EITS_E_ARGUMENT;
-    /* A lower threshold lets more noise through as touches; confirmation over two frames takes
-     * those out again, and what remains is more of the light touches. Fitted on tuning streams. */
+    /* A lower threshold reports more noise as touches; confirmation over two frames removes those
+     * again, and more of the light touches remain. The factor was fitted on tuning streams. */
     options->detection_factor *= EITS_TRACK_DETECTION;
     options->track_confirm = EITS_TRACK_CONFIRM;
     options->track_hold = EITS_TRACK_HOLD;
@@ -74,15 +74,16 @@ static int is_solver(eits_solver solver)
     return 0;
 }
 
-/* The ranges are wide: they keep numbers finite and counts in range, and do not say which values
- * are sensible. */
+/* Check that options are in range. The ranges are wide: they keep numbers finite and counts in
+ * range, and do not say which values are sensible. */
 int eits_options_in_range(const eits_options *o)
 {
     for (size_t k = 0; k < sizeof OPTIONS / sizeof OPTIONS[0]; ++k) {
         if (!is_in_range(o, &OPTIONS[k]))
             return 0;
     }
-    /* A fit starts from the seed and is kept between the other two: a seed outside would jump. */
+    /* A fit starts from the seed radius and stays between the other two: a seed outside them would
+     * jump. */
     return is_solver(o->solver) && o->touch_min_radius_mm <= o->touch_seed_radius_mm &&
            o->touch_seed_radius_mm <= o->touch_max_radius_mm;
 }

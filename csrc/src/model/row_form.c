@@ -1,8 +1,9 @@
-/* Section WHIT of a model: how P and S were whitened.
+/* Read section WHIT of a model: the numbers with which P and S were whitened.
  *
  * The frame's whitening and the diagnostics compute with these numbers and never with P's rows
- * again, so a section that does not fit P would spoil images without a sign. Each row is therefore
- * compared with P here, once, when the model is opened: rank x n_folded multiply-accumulates. */
+ * again, so a section that does not fit P would spoil images without any error. Each row is
+ * therefore compared with P here, once, when the model is opened: rank x n_folded
+ * multiply-accumulates. */
 #include "model/constants.h"
 #include "model/sections.h"
 
@@ -10,13 +11,14 @@
 
 enum { ROW_FORM_HEAD = 16 };
 
-/* Relative, and false for NaN: eits_between is. The numbers span many orders. */
+/* Returns 1 if both differ by at most `tolerance`, relative; 0 for NaN. The numbers span many
+ * orders of magnitude, so the tolerance is relative and not absolute. */
 static int near(float value, float wanted, float tolerance)
 {
     return eits_between(value, wanted - tolerance * wanted, wanted + tolerance * wanted);
 }
 
-/* Whether row i says the same of itself in each of its numbers, and of P. */
+/* Returns 1 if the numbers of row i agree with each other and with P. */
 static int row_fits(const eits_model *model, const eits_row_form *form, uint32_t i)
 {
     const float *p = model->reduction.data;
@@ -25,8 +27,8 @@ static int row_fits(const eits_model *model, const eits_row_form *form, uint32_t
     float sum = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const float value = p[(size_t)k * model->reduction.stride + i];
-        /* in the order of the columns; the tolerance is far above what another order would change
-         */
+        /* the sum runs in the order of the columns; the tolerance is far above the effect of
+         * another order */
         sum += value * value;
     }
     return form->strength[i] >= 0 && square >= 0 && eits_between(energy, FLT_MIN, 1e30f) &&
@@ -37,7 +39,7 @@ static int row_fits(const eits_model *model, const eits_row_form *form, uint32_t
                         EITS_FORM_TOLERANCE * (s1 * s1));
 }
 
-/* How the model was whitened, where it says so: three numbers, then four rows of the stride. */
+/* Read the section if the model has one: three numbers, then four rows of the stride. */
 eits_status eits_read_row_form(eits_model *model, const eits_section *found)
 {
     const uint32_t rank = model->rank, stride = model->reduction.stride;

@@ -1,6 +1,8 @@
-/* Section ORDR: the rows in the order that they are measured, then the place of each in it.
+/* Read section ORDR: the rows in the order in which they are measured, then the position of each
+ * row in that order.
  *
- * Each undoes the other, which only permutations can: so they are checked without memory. */
+ * Each list inverts the other, which is only possible for permutations: so they are checked without
+ * extra memory. */
 #include "model/sections.h"
 
 static int begins_drive(const eits_model *model, uint32_t row)

@@ -1,4 +1,4 @@
-/* What readers of a model's sections share: a section's place, and numbers out of its bytes. */
+/* Readers of a model's sections share these: a section's place, and checks of its numbers. */
 #ifndef EITSKIN_SECTIONS_H
 #define EITSKIN_SECTIONS_H
 
@@ -7,7 +7,7 @@
 #include <string.h>
 
 typedef struct eits_section {
-    const uint8_t *data; /* NULL where absent */
+    const uint8_t *data; /* NULL if the section is absent */
     uint32_t size;
 } eits_section;
 
@@ -18,7 +18,8 @@ static inline float eits_read_f32(const uint8_t *bytes)
     return value;
 }
 
-/* Finite without libm, and whatever -ffast-math a caller may have set: by the exponent's bits. */
+/* Returns 1 if the value is finite. It tests the exponent's bits, without libm, so it works even if
+ * a caller has set -ffast-math. */
 static inline int eits_is_finite_f32(float value)
 {
     uint32_t bits;
@@ -26,47 +27,48 @@ static inline int eits_is_finite_f32(float value)
     return (bits & 0x7F800000u) != 0x7F800000u;
 }
 
-/* Finite, and from `low` to `high`. */
+/* Returns 1 if the value is finite and from `low` to `high`. */
 static inline int eits_between(float value, float low, float high)
 {
     return eits_is_finite_f32(value) && value >= low && value <= high;
 }
 
-/* Section LOAD, where there is one, into model->force: the calibration of forces.
- * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers out of range, or points
- * that do not ascend from zero). */
+/* Read section LOAD, if there is one, into model->force: the calibration of forces. Errors:
+ * EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers out of range, or points that do
+ * not ascend from zero). */
 eits_status eits_read_force(eits_model *model, const eits_section *found);
 
-/* Section WHIT, where there is one, into model->row_form; model->reduction is known and finite.
+/* Read section WHIT, if there is one, into model->row_form; model->reduction is known and finite.
  * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (does not fit P). */
 eits_status eits_read_row_form(eits_model *model, const eits_section *found);
 
-/* Section UNCE, where there is one, into model->uncertainty; model->rank and row_form are known.
+/* Read section UNCE, if there is one, into model->uncertainty; model->rank and row_form are known.
  * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are not finite, a
- * variance below 0, or a model that does not say how it was whitened). */
+ * variance below 0, or a model without section WHIT). */
 eits_status eits_read_uncertainty(eits_model *model, const eits_section *found);
 
-/* Section GEOM, where there is one, into model->uncertainty; that and model->n_folded are known.
- * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are out of range, or
- * a model without UNCE). */
+/* Read section GEOM, if there is one, into model->uncertainty; that and model->n_folded are known.
+ * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers out of range, or a model
+ * without UNCE). */
 eits_status eits_read_places(eits_model *model, const eits_section *found);
 
-/* Section MOVE, where there is one, into model->uncertainty; GEOM and model->n_folded are known.
- * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are out of range, or
- * a model without GEOM). */
+/* Read section MOVE, if there is one, into model->uncertainty; GEOM and model->n_folded are known.
+ * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers out of range, or a model
+ * without GEOM). */
 eits_status eits_read_moves(eits_model *model, const eits_section *found);
 
-/* Section PREC, where there is one, into model->precision; row_form is known.
- * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are not finite, a
- * variance below 0, or a model that says how it was whitened besides). */
+/* Read section PREC, if there is one, into model->precision; row_form is known. Errors:
+ * EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are not finite, a variance
+ * below 0, or a model that also has section WHIT). */
 eits_status eits_read_precision(eits_model *model, const eits_section *found);
 
-/* Section PLAC, where there is one, into model->place_factor.
- * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (no number from 0 on). */
+/* Read section PLAC, if there is one, into model->place_factor. Errors: EITS_E_MODEL_SECTION (wrong
+ * size), EITS_E_MODEL_VALUE (negative, or not a finite number). */
 eits_status eits_read_place_factor(eits_model *model, const eits_section *found);
 
-/* Section ORDR, where there is one, into model->scan_order and scan_place; the protocol is known.
- * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (not each drive once, whole). */
+/* Read section ORDR, if there is one, into model->scan_order and scan_place; the protocol is known.
+ * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (the order does not have each drive
+ * exactly once and whole). */
 eits_status eits_read_scan_order(eits_model *model, const eits_section *found);
 
 #endif

@@ -1,8 +1,9 @@
-/* Section UNCE: four numbers, then two lower triangles of rank (rank + 1) / 2 float32 each.
+/* Read section UNCE: four numbers, then two lower triangles of rank (rank + 1) / 2 float32 each.
  *
- * In: the section's bytes, in place. Out: pointers into them. Both triangles are second moments, so
- * a diagonal below zero is a damaged or made-up file; whether they are positive semidefinite is not
- * checked here, for what uses them (evidence/covariance.c) adds noise and holds its pivots up. */
+ * The section's bytes are used in place, by pointers into them. Both triangles are second moments,
+ * so a diagonal below zero shows a damaged or invented file. Whether they are positive semidefinite
+ * is not checked here, since the code that uses them (evidence/covariance.c) adds noise and limits
+ * its pivots from below. */
 #include "model/sections.h"
 
 enum { HEAD = 16 };
@@ -19,7 +20,7 @@ static int is_second_moment(const float *triangle, uint32_t rank)
     return 1;
 }
 
-/* Section PREC: one such triangle, of the rows' precision. */
+/* Read section PREC: one such triangle, the precision of the rows. */
 eits_status eits_read_precision(eits_model *model, const eits_section *section)
 {
     const size_t folded = model->n_folded, numbers = folded * (folded + 1u) / 2u;
@@ -44,7 +45,7 @@ eits_status eits_read_place_factor(eits_model *model, const eits_section *sectio
     return eits_between(model->place_factor, 0, 1e30f) ? EITS_OK : EITS_E_MODEL_VALUE;
 }
 
-/* Small enough that sums of squares are numbers. */
+/* Returns 1 if the numbers are small enough that sums of their squares are finite. */
 static int are_places(const float *values, uint32_t count)
 {
     for (uint32_t i = 0; i < count; ++i) {
@@ -54,7 +55,8 @@ static int are_places(const float *values, uint32_t count)
     return 1;
 }
 
-/* Section GEOM: so many numbers for each fold. */
+/* Read section GEOM: for each fold, one number per row of the matrix. The number of rows follows
+ * from the section's size. */
 eits_status eits_read_places(eits_model *model, const eits_section *section)
 {
     const float *values = (const float *)(const void *)section->data;
@@ -71,8 +73,8 @@ eits_status eits_read_places(eits_model *model, const eits_section *section)
     return EITS_OK;
 }
 
-/* Section MOVE: rows, terms, rows of the rest; so many numbers for each fold, for either axis and
- * each term, and for each fold. */
+/* Read section MOVE: the counts of rows, terms and rows of the rest; then `rows` numbers per fold,
+ * `rows` numbers per axis and term, and the rest's numbers per fold. */
 eits_status eits_read_moves(eits_model *model, const eits_section *section)
 {
     uint32_t head[4];
