@@ -1,7 +1,8 @@
-/* From voltages to reduced data: difference to the reference, fold, and the directions to ignore.
+/* Turn voltages into reduced data: difference to the reference, fold, and projection on the
+ * directions in use.
  *
- * A frame has a voltage a row; the solver wants `rank` numbers that say all the frame says of the
- * conductivity. Three linear steps make them, in this order:
+ * A frame has one voltage per row; the solver wants `rank` numbers with all of the frame's
+ * information about the conductivity. Three linear steps make them, in this order:
  *
  *   datum   gain (v - v0), or its ratio or logarithm as the model was built. The difference removes
  *           what contacts, shape and amplifier have in common with the reference; the gain scales
@@ -10,15 +11,15 @@
  *           a difference that checks itself (diagnostics/outliers.c).
  *   reduce  y = P d, folds x rank multiply-accumulates: the whitened singular directions.
  *
- * A row that cannot be used is not replaced by a guess. Its reciprocal stands for both where there
- * is one; else the fold is left out of P d, and either F whitens the rest (frame/whitening.h) or
- * the direction that the fold would have moved y along, P e_k, is ignored: projected out of y and
- * of every F S x alike. The same is done with the direction of a gain's drift, P v0, along which
- * temperature and supply move all data at once.
+ * A row that cannot be used is not replaced by a guess. If its reciprocal can be used, that stands
+ * for both. Else the fold is left out of P d, and then either F whitens the rest
+ * (frame/whitening.h), or the direction P e_k along which the fold would have moved y is ignored:
+ * it is projected out of y and of every F S x alike. The same is done with P v0, the direction of
+ * gain drift, along which temperature and supply move all data at once.
  *
- * The basis of ignored directions depends on which sides are in use and on the reference, not on
- * the frame, so it is built again only when one of these changes (projection.stale): a frame with
- * unchanged rows pays for P d and the projection alone. */
+ * The basis of ignored directions depends on the sides in use and on the reference, not on the
+ * frame, so it is built again only when one of these changes (projection.stale): a frame with
+ * unchanged rows costs only P d and the projection. */
 #include "frame/fold.h"
 
 #include "base/log.h"
@@ -28,15 +29,16 @@
 #include "frame/whitening.h"
 #include "kernels/kernels.h"
 
-/* v0 log(v / v0): beyond EITS_MAX_RATIO either way it is no touch; and the logarithm must not meet
- * zero or a turned sign. */
+/* Returns v0 log(v / v0). The ratio is limited to EITS_MAX_RATIO either way: beyond that it is not
+ * a touch, and the logarithm must not meet zero or a changed sign. */
 static eits_real log_datum(const eits_context *ctx, eits_real v, eits_real v0)
 {
     const eits_real q = v / v0, low = 1 / EITS_MAX_RATIO, high = EITS_MAX_RATIO;
     return ctx->reference.gain * v0 * eits_log(q < low ? low : (q > high ? high : q));
 }
 
-/* The datum of row i from its voltage, in model volts (or without unit where normalised). */
+/* Returns the datum of row i from its voltage, in model volts (or without unit if the model is
+ * normalised). */
 static eits_real datum(const eits_context *ctx, uint32_t i, eits_real v)
 {
     const eits_real v0 = ctx->reference.v0[i], own = ctx->reference.row_gain[i];
@@ -51,15 +53,15 @@ static eits_real datum(const eits_context *ctx, uint32_t i, eits_real v)
     return own * (ctx->reference.gain * (v - v0));
 }
 
-/* Rows whose reference is all but zero say nothing as a ratio. */
+/* Returns 1 for a row whose reference is so close to zero that a ratio to it has no meaning. */
 static int ratio_undefined(const eits_context *ctx, eits_real v0)
 {
     return ctx->model->data_kind != EITS_DATA_DIFFERENCE &&
            eits_fabs(v0) < EITS_RATIO_DEFINED * ctx->reference.v0_rms;
 }
 
-/* A row and its reciprocal that differ by less than rounding of their references agree: quantised
- * voltages often do. */
+/* Returns 1 if a row and its reciprocal differ by more than rounding of their references. Smaller
+ * differences are common with quantised voltages and count as none. */
 static int exceeds_rounding(const eits_context *ctx, eits_real difference, uint32_t i)
 {
     const eits_real in_model_volts =
@@ -69,8 +71,9 @@ static int exceeds_rounding(const eits_context *ctx, eits_real difference, uint3
                (ctx->model->data_kind == EITS_DATA_NORMALISED ? 1 : eits_fabs(in_model_volts));
 }
 
-/* d_k: the mean of a row and its reciprocal, or whichever is usable; reciprocity_error_k: their
- * difference. Where other sides are in use than before, the basis has to be built again. */
+/* Compute d_k, the mean of a row and its reciprocal or the usable one of them, and
+ * reciprocity_error_k, their difference. If other sides are in use than before, the basis has to be
+ * built again. */
 void eits_fold_data(eits_context *ctx, const eits_real *frame)
 {
     const eits_real *v0 = ctx->reference.v0;
@@ -83,8 +86,8 @@ void eits_fold_data(eits_context *ctx, const eits_real *frame)
             const uint32_t i = rows[side];
             if (i == EITS_FOLD_NONE || ctx->rows.unusable[i] || ratio_undefined(ctx, v0[i]))
                 continue;
-            /* a ratio has no sign to turn: only the differences of a reciprocal measured the other
-             * way round do */
+            /* a reciprocal that was measured the other way round has differences of opposite sign;
+             * a ratio has not */
             const int turn =
                 side == 1 && fold.sign < 0 && ctx->model->data_kind != EITS_DATA_NORMALISED;
             const eits_real measured = datum(ctx, i, frame[i]), value = turn ? -measured : measured;
@@ -101,7 +104,7 @@ void eits_fold_data(eits_context *ctx, const eits_real *frame)
     }
 }
 
-/* P e_k for one folded row. */
+/* out = P e_k for one folded row. */
 static void reduction_column(const eits_context *ctx, uint32_t k, eits_real *out)
 {
     const eits_real one = 1;
@@ -111,8 +114,8 @@ static void reduction_column(const eits_context *ctx, uint32_t k, eits_real *out
 /* Add `candidate` to the basis unless it lies in its span: Gram-Schmidt, twice for accuracy in
  * float32.
  *
- * A second pass since rounding of the first leaves parts of the basis that are as large as what is
- * left of a nearly dependent direction ("twice is enough": Parlett, The Symmetric Eigenvalue
+ * A second pass is needed since rounding in the first leaves parts of the basis that are as large
+ * as the rest of a nearly dependent direction ("twice is enough": Parlett, The Symmetric Eigenvalue
  * Problem, section 6.9). */
 static uint64_t extend_basis(eits_context *ctx, eits_real *candidate)
 {
@@ -125,7 +128,7 @@ static uint64_t extend_basis(eits_context *ctx, eits_real *candidate)
     for (int pass = 0; pass < 2; ++pass)
         macs += eits_project(ctx, candidate);
     const eits_real after = eits_dot(ctx->kernels, candidate, candidate, rank);
-    /* What is left is rounding: the direction is there already. */
+    /* The rest is rounding: the direction is already in the basis. */
     if (!(after > EITS_BASIS_TOLERANCE * before))
         return macs;
     const eits_real scale = 1 / eits_sqrt(after);
@@ -135,13 +138,13 @@ static uint64_t extend_basis(eits_context *ctx, eits_real *candidate)
     return macs + 2u * rank;
 }
 
-/* Row i's reference times its own gain. */
+/* Returns row i's reference times its own gain. */
 static eits_real scaled_reference(const eits_context *ctx, uint32_t i)
 {
     return ctx->reference.row_gain[i] * ctx->reference.v0[i];
 }
 
-/* The reduced direction along which drift of the gain moves the data: the reference, folded as the
+/* Compute the reduced direction along which gain drift moves the data: the reference, folded as the
  * data are. */
 static uint64_t drift_direction(eits_context *ctx, const eits_scratch *scratch, eits_real *out)
 {
@@ -159,7 +162,8 @@ static uint64_t drift_direction(eits_context *ctx, const eits_scratch *scratch, 
         ctx->projection.gain_drift[k] =
             used != EITS_SIDE_NONE && model->data_kind == EITS_DATA_NORMALISED ? 1 : along;
     }
-    /* Kept unreduced as well: the test for data off the model's range leaves the drift out, too. */
+    /* The direction is kept unreduced as well: the test for off-range data also leaves gain drift
+     * out. */
     ctx->kernels->mul(&model->reduction, scratch->index, ctx->projection.gain_drift,
                       model->n_folded, out);
     for (uint32_t k = 0; k < model->n_folded; ++k)
@@ -168,12 +172,12 @@ static uint64_t drift_direction(eits_context *ctx, const eits_scratch *scratch, 
            eits_fill_rows(ctx, scratch, model->n_folded, out);
 }
 
-/* Folds first, then the drift: where directions run out, what was not measured must be ignored,
- * what drifts should be. */
+/* Folds are added first, then gain drift: if directions run out, the unmeasured folds must be
+ * ignored, while drift only should be. */
 uint64_t eits_build_basis(eits_context *ctx, const eits_scratch *scratch)
 {
     eits_real *direction = scratch->row[0];
-    /* Where F takes care of the folds left out, their directions need not be ignored. */
+    /* If F accounts for the folds left out, their directions need not be ignored. */
     uint64_t macs = eits_whitening_build(ctx, scratch);
     ctx->projection.count = 0;
     eits_zero(ctx->projection.gain_drift, ctx->model->n_folded);
@@ -193,7 +197,7 @@ uint64_t eits_build_basis(eits_context *ctx, const eits_scratch *scratch)
     return macs;
 }
 
-/* y = P d of the folds in use, not yet projected; returns their number. */
+/* Compute y = P d from the folds in use, not yet projected; returns their number. */
 uint32_t eits_reduce_frame(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {
     uint32_t count = 0;
@@ -222,8 +226,8 @@ uint64_t eits_reduce(eits_context *ctx, const eits_scratch *scratch, uint32_t co
     return macs + eits_project(ctx, out);
 }
 
-/* y_log: the same of v0 log(v / v0), for the first places of touches. Rows whose reference is
- * all but zero stay differences. */
+/* Compute y_log, the same from v0 log(v / v0), for the first places of touches. Rows whose
+ * reference is close to zero stay differences. */
 uint64_t eits_reduce_log(eits_context *ctx, const eits_scratch *scratch, const eits_real *frame)
 {
     const eits_real *v0 = ctx->reference.v0, min = EITS_RATIO_DEFINED * ctx->reference.v0_rms;

@@ -1,21 +1,23 @@
-/* One frame from voltages to reduced data. The order is fold, basis (where it is stale), reduce. */
+/* Turn one frame from voltages into reduced data. The order is fold, basis (if it is stale),
+ * reduce. */
 #ifndef EITSKIN_FOLD_H
 #define EITSKIN_FOLD_H
 
 #include "context/context.h"
 
-/* frame.d, .reciprocity_error and .sides from the rows in use. Where other sides are in use than
- * before, the basis is stale. */
+/* Compute frame.d, .reciprocity_error and .sides from the rows in use. If other sides are in use
+ * than before, the basis becomes stale. */
 void eits_fold_data(eits_context *ctx, const eits_real *frame);
 
-/* Whitening, directions to ignore and the gain's drift for frame.sides and the reference. Returns
- * the multiply-accumulates, as do all that follow. */
+/* Build the whitening, the directions to ignore and the gain drift for frame.sides and the
+ * reference. Returns the multiply-accumulates, as do all functions that follow. */
 uint64_t eits_build_basis(eits_context *ctx, const eits_scratch *scratch);
 
-/* frame.y = P d of the folds in use, neither whitened again nor projected; returns their number. */
+/* Compute frame.y = P d from the folds in use, neither whitened again nor projected; returns their
+ * number. */
 uint32_t eits_reduce_frame(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs);
 
-/* frame.y_log, of v0 log(v / v0), whitened and projected as frame.y will be. */
+/* Compute frame.y_log from v0 log(v / v0), whitened and projected as frame.y will be. */
 uint64_t eits_reduce_log(eits_context *ctx, const eits_scratch *scratch, const eits_real *frame);
 
 /* out (stride numbers) = P of the `count` folds in scratch->index with the data in scratch->value,
@@ -23,7 +25,7 @@ uint64_t eits_reduce_log(eits_context *ctx, const eits_scratch *scratch, const e
 uint64_t eits_reduce(eits_context *ctx, const eits_scratch *scratch, uint32_t count,
                      eits_real *out);
 
-/* The same, not projected. */
+/* Does the same without the projection. */
 uint64_t eits_reduce_whole(eits_context *ctx, const eits_scratch *scratch, uint32_t count,
                            eits_real *out);
 

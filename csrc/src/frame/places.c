@@ -1,16 +1,15 @@
-/* What the reference tells of places (sections GEOM and MOVE of a model).
+/* Learn from the reference how places are displaced (sections GEOM and MOVE of a model).
  *
- * Electrodes and an outline that lie elsewhere than modelled change the untouched skin's voltages
- * in other ways than a sheet that is uneven, and they move every touch that is found. With y =
- * log(v0 / v_ref) over the folds, z = M y are the parts of y that say so, in mm, and a touch at x,
- * y is found off by
+ * Electrodes or an outline that differ from the model change the untouched skin's voltages in other
+ * ways than an uneven sheet, and they move every touch that is found. With y = log(v0 / v_ref) over
+ * the folds, z = M y are the parts of y that show this, in mm, and a touch at x, y is found off by
  *
  *     sum_t T_t(x, y) sum_j U_tj z_j,    T_t = 1, x, y, x^2, x y, y^2, ...
  *
- * along either axis, x and y from the grid's middle over half its longer side. That is taken back
- * (context/places.c); |N'y|^2 is the variance of what it leaves. Directions of y that no such skin
- * has tell how much of it is of rows with gains of their own: the more, the less is taken back.
- * python/eitskin/model/tare_places.py has the formulas. */
+ * along either axis, with x and y from the grid's middle over half its longer side.
+ * context/places.c subtracts this shift; |N'y|^2 is the variance of the remaining error. Directions
+ * of y that no such skin has show how much of y comes from gains of single rows: the more, the
+ * smaller the correction. python/eitskin/model/tare_places.py has the formulas. */
 #include "frame/reference.h"
 
 #include "base/vec.h"
@@ -30,9 +29,8 @@ void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain,
         sums->rest[j] = eits_fma((eits_real)u->rest[rest + j], log_gain, sums->rest[j]);
 }
 
-/* How far to trust the correction: rows with gains of their own look like electrodes elsewhere,
- * too.
- */
+/* Returns the trust in the correction, 0 to 1: gains of single rows look like displaced electrodes,
+ * too. */
 static eits_real trust(const eits_uncertainty *u, const eits_real *rest)
 {
     eits_real square = 0;
@@ -57,7 +55,7 @@ void eits_learn_places(eits_context *ctx, const eits_place_sums *sums)
             eits_real shift = 0;
             for (uint32_t j = 0; j < u->move_rows; ++j)
                 shift = eits_fma((eits_real)row[j], sums->move[j], shift);
-            /* the gains' logarithms are -y: it takes back */
+            /* the gains' logarithms are -y, so this shift is the correction */
             b->shift_mm[axis][t] = b->place_trust * shift;
         }
     }

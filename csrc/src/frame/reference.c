@@ -1,9 +1,9 @@
 /* The reference frame: its mean and noise over several frames, and how it fits the model.
  *
- * Everything later is a difference to the reference, so its errors are in every image: the noise of
- * one frame would be a fixed pattern, the mean of n has it by root n less. The same frames tell how
- * much noise there is (noise_v), from which the regularisation, the detection threshold and the
- * outliers' limits follow.
+ * All later data are differences to the reference, so its errors are in every image: the noise of
+ * one frame would be a fixed pattern, and the mean of n frames reduces it by root n. The same
+ * frames show how much noise there is (noise_v); the regularisation, the detection threshold and
+ * the outliers' limits follow from it.
  *
  * Mean and squared deviations are kept by Welford's recursion, one frame at a time: no frame is
  * stored, and no difference of large sums loses the small deviations in float32.
@@ -20,14 +20,14 @@
 #include "base/vec.h"
 #include "frame/constants.h"
 
-/* A reference frame must be whole: rows that cannot be used are to be masked first. */
+/* Check that a reference frame is whole: rows that cannot be used must be masked first. */
 eits_status eits_check_reference_frame(const eits_context *ctx, const eits_real *frame,
                                        size_t length)
 {
     if (length != ctx->model->n_rows)
         return EITS_E_FRAME_LENGTH;
-    /* A row without a voltage here would be one without a reference for every frame to come: that
-     * is to be decided by masking it, not by a bad frame. */
+    /* A row without a voltage here would lack a reference in all later frames. The user has to
+     * decide that by masking it; a bad frame must not. */
     const eits_real limit = ctx->options.saturation_v;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         if (!ctx->rows.masked[i] &&
@@ -37,15 +37,15 @@ eits_status eits_check_reference_frame(const eits_context *ctx, const eits_real 
     return EITS_OK;
 }
 
-/* Whether a row takes part in the reference: not masked, neither now nor when the reference was
- * taken. */
+/* Returns 1 if a row takes part in the reference: it is not masked now and was not when the
+ * reference was taken. */
 static int has_reference(const eits_context *ctx, uint32_t row)
 {
     return row != EITS_FOLD_NONE && !ctx->rows.masked[row] &&
            eits_is_finite(ctx->reference.v0[row]);
 }
 
-/* The reference on one folded row: the mean of both sides in use; 0 where neither is. */
+/* Returns the reference on one folded row: the mean of both sides in use; 0 if neither is. */
 static eits_real folded_reference(const eits_context *ctx, eits_fold fold)
 {
     const eits_real *v0 = ctx->reference.v0;
@@ -54,7 +54,7 @@ static eits_real folded_reference(const eits_context *ctx, eits_fold fold)
     return first && second ? R(0.5) * (v0[fold.first] + turned) : (first ? v0[fold.first] : turned);
 }
 
-/* The gain that makes row i's reference the model's `expected`; 1 where their signs differ. */
+/* Returns the gain that makes row i's reference the model's `expected`; 1 if their signs differ. */
 static eits_real own_gain(const eits_context *ctx, uint32_t i, eits_real expected)
 {
     const eits_real measured = ctx->reference.gain * ctx->reference.v0[i],
@@ -66,8 +66,9 @@ static eits_real own_gain(const eits_context *ctx, uint32_t i, eits_real expecte
                : (ratio < 1 / EITS_MAX_ROW_GAIN ? 1 / EITS_MAX_ROW_GAIN : ratio);
 }
 
-/* How far the reference is from the model, and its rows from their reciprocals; and what the first
- * says of places (places.c). A fold without reference is taken as modelled. */
+/* Measure the distance of the reference from the model and of its rows from their reciprocals, and
+ * learn the shift of places from the gains (places.c). A fold without reference is taken as
+ * modelled. */
 static void measure_distance(eits_context *ctx)
 {
     const eits_model *model = ctx->model;
@@ -99,12 +100,12 @@ static void measure_distance(eits_context *ctx)
     b->reciprocity = pairs > 0 ? eits_sqrt(apart / (eits_real)pairs) : 0;
 }
 
-/* Row gains: what makes the reference the model's own, row by row.
+/* Learn the row gains, which make the reference equal to the model's, row by row.
  *
- * A sheet that is uneven changes the field of each drive and measuring pair alike for the reference
- * and for what a touch adds; so the ratio that the reference shows is, to first order, the ratio
- * that the data have, and dividing it out leaves data of the modelled sheet. Where the instrument
- * differs from the model (another order, channels of their own gain, contacts), it is not. */
+ * An uneven sheet changes the field of each drive and measuring pair alike for the reference and
+ * for the signal of a touch. So the ratio in the reference is, to first order, the ratio in the
+ * data, and dividing it out leaves data of the modelled sheet. This does not hold if the instrument
+ * differs from the model (another order of rows, gains of single channels, contacts). */
 void eits_learn_row_gains(eits_context *ctx)
 {
     const eits_model *model = ctx->model;
@@ -161,7 +162,8 @@ eits_status eits_fit_reference(eits_context *ctx)
     b->correlation = vr / (eits_sqrt(vv) * eits_sqrt(rr));
     b->v0_rms = largest * eits_sqrt(vv / (eits_real)used);
     b->gain = largest_ref / largest * (eits_sqrt(rr) / eits_sqrt(vv));
-    /* The sign is the wiring's: a board that swaps V+ and V- measures as well as any other. */
+    /* The sign belongs to the wiring: a board that swaps V+ and V- measures as well as any other.
+     */
     if (b->correlation < 0)
         b->gain = -b->gain;
     ctx->projection.stale = 1;
@@ -171,9 +173,10 @@ eits_status eits_fit_reference(eits_context *ctx)
     return EITS_OK;
 }
 
-/* The greatest power of two up to the greatest voltage in use, within what has an inverse.
+/* Returns the greatest power of two up to the greatest voltage in use, limited to numbers that have
+ * an inverse.
  *
- * A power of two, so that dividing by it rounds nothing. */
+ * It is a power of two so that dividing by it rounds nothing. */
 eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame)
 {
     eits_real largest = 0, unit = 1;
@@ -187,10 +190,10 @@ eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame)
     return unit;
 }
 
-/* The rms over rows of the frames' deviation, so far; 0 where it is out of range.
+/* Returns the rms over rows of the frames' deviation so far; 0 if it is out of range.
  *
- * One number for all rows: white noise of the front end. Rows of few frames would each have an
- * estimate that is itself noise. */
+ * One number serves for all rows, since the front end's noise is white. With few frames, an
+ * estimate per row would itself be noise. */
 eits_real eits_reference_noise(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
@@ -207,8 +210,8 @@ eits_real eits_reference_noise(const eits_context *ctx)
     return eits_is_finite(noise_v) ? noise_v : 0;
 }
 
-/* Frames that were rounded, or measured in steps without noise, may repeat to the last bit: that is
- * no sign of a noiseless front end. */
+/* Frames that were rounded, or measured in steps without noise, may repeat to the last bit: that
+ * does not show a noiseless front end. */
 eits_real eits_noise_floor_v(const eits_context *ctx)
 {
     const eits_real rounding = EITS_NOISE_ROUNDING * ctx->reference.v0_rms;
@@ -235,15 +238,16 @@ void eits_take_reference_frame(eits_context *ctx, const eits_real *frame)
             b->v0[i] = R(NAN);
         if (!eits_is_finite(b->v0[i]))
             continue;
-        /* In units of m2_unit, since the square of a microvolt is no float32 beside that of a volt.
-         */
+        /* Deviations are in units of m2_unit, since the square of a microvolt vanishes in float32
+         * beside that of a volt. */
         const eits_real delta = frame[i] - b->v0[i];
         b->v0[i] += delta / (eits_real)b->count;
         b->m2[i] = eits_fma(delta / b->m2_unit, (frame[i] - b->v0[i]) / b->m2_unit, b->m2[i]);
     }
 }
 
-/* The second frame waits in m2 until a third tells which of them is right where they differ. */
+/* The second frame waits in m2 until a third one decides which of the two is right where they
+ * differ. */
 void eits_keep_second_frame(eits_context *ctx, const eits_real *frame)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
@@ -258,7 +262,8 @@ void eits_keep_second_frame(eits_context *ctx, const eits_real *frame)
 void eits_take_second_frame(eits_context *ctx)
 {
     eits_reference *b = &ctx->reference;
-    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) { /* as eits_take_reference_frame */
+    for (uint32_t i = 0; i < ctx->model->n_rows;
+         ++i) { /* the same recursion as in eits_take_reference_frame */
         const eits_real delta = b->m2[i] - b->v0[i], second = b->m2[i];
         b->m2[i] = 0;
         if (!eits_is_finite(b->v0[i]))

@@ -5,28 +5,29 @@
 
 #include "context/context.h"
 
-/* Whether each row that is not masked has a finite voltage below saturation.
- * Errors: EITS_E_FRAME_LENGTH, EITS_E_FRAME_ROWS. */
+/* Check that each row that is not masked has a finite voltage below saturation. Errors:
+ * EITS_E_FRAME_LENGTH, EITS_E_FRAME_ROWS. */
 eits_status eits_check_reference_frame(const eits_context *ctx, const eits_real *frame,
                                        size_t length);
 
 /* Set gain, correlation and v0_rms from v0; the basis is stale then. Errors: EITS_E_FRAME_ZERO. */
 eits_status eits_fit_reference(eits_context *ctx);
 
-/* reference.row_gain, distance and reciprocity from v0 and the gain, as the options ask; the basis
- * is stale then. */
+/* Learn reference.row_gain, distance and reciprocity from v0 and the gain, as the options ask; the
+ * basis is stale then. */
 void eits_learn_row_gains(eits_context *ctx);
 
-/* The greatest power of two up to the greatest voltage in use, within what has an inverse. */
+/* Returns the greatest power of two up to the greatest voltage in use, limited to numbers that have
+ * an inverse. */
 eits_real eits_reference_unit(const eits_context *ctx, const eits_real *frame);
 
-/* The rms over rows of the deviation of the frames so far, V; 0 if it is out of range. */
+/* Returns the rms over rows of the deviation of the frames so far, V; 0 if it is out of range. */
 eits_real eits_reference_noise(const eits_context *ctx);
 
-/* The least noise of a row, V: the option's, or what rounding leaves. */
+/* Returns the minimum noise of a row, V: the option's, or the noise of rounding. */
 eits_real eits_noise_floor_v(const eits_context *ctx);
 
-/* max(S'y) of noise of that size, with all rows in use. */
+/* Returns max(S'y) for noise of that size, with all rows in use. */
 eits_real eits_lambda_noise_floor(const eits_context *ctx);
 
 /* Take one more frame into the mean and the squares; rows that were masked lose their reference. */
@@ -44,17 +45,17 @@ typedef struct eits_place_sums {
     eits_real place[EITS_MAX_PLACE_ROWS], move[EITS_MAX_PLACE_ROWS], rest[EITS_MAX_PLACE_ROWS];
 } eits_place_sums;
 
-/* Add what fold k's logarithm of its gain makes of them. */
+/* Add to these sums the share of the logarithm of fold k's gain. */
 void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain,
                        eits_place_sums *sums);
 
-/* reference.place_mm2 and shift_mm from them. */
+/* Learn reference.place_mm2 and shift_mm from these sums. */
 void eits_learn_places(eits_context *ctx, const eits_place_sums *sums);
 
 /* ---- reference_tracking.c ---- */
 
-/* Whether the reference has been tracked for long enough that its drift can be judged: after a
- * sixteenth of the time constant. Single frames never are. */
+/* Returns 1 if the reference has been tracked for long enough that its drift can be judged: after a
+ * sixteenth of the time constant. A reference from a single frame is never tracked. */
 int eits_tracks_reference(const eits_context *ctx);
 
 /* A frame was solved: add its difference from the reference to the mean under way.

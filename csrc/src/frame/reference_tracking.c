@@ -172,8 +172,8 @@ static uint32_t span_touches(const eits_context *ctx, const eits_scratch *scratc
     return known;
 }
 
-/* By how much the frame in m2 is larger than the reference, apart from what its touches explain; 0
- * if they may explain all of it. Overwrites m2. */
+/* Returns the growth of the frame in m2 over the reference, apart from the parts that its touches
+ * explain; 0 if they may explain all of it. Overwrites m2. */
 static eits_real gain_beside(eits_context *ctx, const eits_scratch *scratch,
                              const eits_touch *touches, uint32_t count, uint64_t *macs)
 {

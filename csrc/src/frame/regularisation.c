@@ -1,10 +1,11 @@
-/* How strongly the weak directions are to be heard, for this board's noise and this frame's rows.
+/* Choose the regularisation, which is the weight of the weak directions, for this board's noise and
+ * this frame's rows.
  *
  * The builder's whitening divides each singular direction by sqrt(s_i^2 + mu s_1^2). A small mu
- * sharpens the image and amplifies noise in directions the electrodes hardly see. The
- * model was built with one mu. Two things ask for another one here: a noisy
- * reference raises it, in proportion to its noise over its rms; rows left out lower it, since they
- * speak of fewer directions, down to what float32 still solves.
+ * sharpens the image and amplifies noise in directions the electrodes hardly see. The model was
+ * built with one mu. Two things change it here: a noisy reference raises it, in proportion to its
+ * noise over its rms; rows left out lower it, since fewer directions are measured, down to the
+ * limit of what float32 can solve.
  *
  * The result is D (whitening.h), `rank` weights applied to y and in each product: the stored
  * model stays as it is, in flash. Weights never exceed 1, so the step of FISTA stays valid. */
@@ -13,18 +14,18 @@
 #include "base/vec.h"
 #include "frame/constants.h"
 
-/* What the noise asks for.
+/* Returns the regularisation that the noise asks for.
  *
- * Noise over the reference's rms says how much of the data is noise on a skin that nothing
- * touches; the factor was fitted to what of it the image shows. Without a learned reference
- * there is nothing to go by. */
+ * Noise over the reference's rms is the fraction of noise in the data of an untouched skin; the
+ * factor was fitted to the noise that then shows in the image. Without a learned reference the
+ * noise is unknown, and the result is 0. */
 static eits_real asked_regularisation(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
     const eits_real by_noise =
         b->noise_v > 0 ? ctx->options.regularisation_noise_factor * (b->noise_v / b->v0_rms) : 0;
-    /* the frames of an instrument that differs from the model are right in its strongest
-     * directions only */
+    /* an instrument that differs from the model gives frames that are right only in the strongest
+     * directions */
     return !b->far && by_noise < EITS_MAX_REGULARISATION ? by_noise : EITS_MAX_REGULARISATION;
 }
 
@@ -46,8 +47,8 @@ eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing
     return wanted > EITS_MIN_REGULARISATION ? wanted : EITS_MIN_REGULARISATION;
 }
 
-/* D_i, so scaled that the strongest direction keeps its weight. None exceeds 1, so the model's
- * Lipschitz constant holds, whatever rounding made of the stored matrices. */
+/* Returns D_i, scaled so that the strongest direction keeps its weight. None exceeds 1, so the
+ * model's Lipschitz constant holds, whatever rounding made of the stored matrices. */
 static eits_real weight_of(const eits_context *ctx, eits_real regularisation, uint32_t i)
 {
     const eits_real square = ctx->whitening.s1_square * (1 + regularisation) /
@@ -56,10 +57,10 @@ static eits_real weight_of(const eits_context *ctx, eits_real regularisation, ui
     return weight < 1 ? weight : 1;
 }
 
-/* White noise on the rows has the covariance diag(w^2) in P d, so in S'D D P d, as a mean square
- * over S's columns, the sum of |S_i|^2 w_i^2 D_i^4: s_i^2 w_i^4 D_i^4.
+/* White noise on the rows has the covariance diag(w^2) in P d. Its mean square in S'D D P d, over
+ * S's columns, is therefore the sum of |S_i|^2 w_i^2 D_i^4 = s_i^2 w_i^4 D_i^4.
  *
- * How much more or less noise reaches S'y decides what counts as a touch: lambda_noise was
+ * The result is the change of that noise by the regularisation. It is needed since lambda_noise was
  * learned with one whitening and is used with another. */
 eits_real eits_regularisation_noise(const eits_context *ctx, eits_real regularisation)
 {

@@ -1,4 +1,5 @@
-/* Rows left out of a taught model: they are filled in, and F says how much less the rest tells.
+/* Rows left out of a taught model are filled in, and F accounts for the reduced information of the
+ * rest.
  *
  * A taught model's P = U'W whitens noise of covariance C, and its section PREC has R = C^-1 over
  * what makes P R^-1 P' = I. The rows m left out are given what the noise of the others o makes them
@@ -18,16 +19,16 @@
 #include "frame/constants.h"
 #include "kernels/column.h"
 
-/* R is symmetric, its lower triangle is stored. */
+/* R is symmetric; only its lower triangle is stored. */
 static eits_real precision(const eits_context *ctx, uint32_t i, uint32_t j)
 {
     const size_t high = i > j ? i : j, low = i > j ? j : i;
     return (eits_real)ctx->model->precision[high * (high + 1u) / 2u + low];
 }
 
-/* L of R_mm = L L', packed, in the metric's place. It fits: there are at most as many rows as
- * directions. A pivot that rounding has eaten makes a NaN, which the check of the whole triangle F
- * finds; the stored whitening is used then. */
+/* Compute L of R_mm = L L', packed, in the metric's place. It fits: there are at most as many rows
+ * as directions. A pivot that rounding has made negative gives a NaN, which the check of the whole
+ * triangle F finds; the stored whitening is used then. */
 static uint64_t factor_left_out(eits_context *ctx, const uint32_t *out, uint32_t count)
 {
     eits_real *lower = ctx->whitening.metric;
@@ -40,12 +41,12 @@ static uint64_t factor_left_out(eits_context *ctx, const uint32_t *out, uint32_t
     return (uint64_t)count * count * count / 6u;
 }
 
-/* Which rows are left out, in order. */
+/* List the rows that are left out, in order; returns their number. */
 static uint32_t list_left_out(const eits_context *ctx, uint32_t *out)
 {
     uint32_t count = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        /* written always and counted where it holds: no branch */
+        /* always written, but counted only if the row is left out: no branch */
         out[count] = k;
         count += ctx->frame.sides[k] == 0;
     }
@@ -100,7 +101,7 @@ uint64_t eits_fill_rows(eits_context *ctx, const eits_scratch *scratch, uint32_t
     }
     eits_lower_solve(lower, count, x);
     eits_lower_solve_transposed(lower, count, x);
-    /* y takes what the rows left out are expected to say, each by its column of P. */
+    /* Add the expected data of the rows left out to y, each by its column of P. */
     uint32_t a = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         if (ctx->frame.sides[k] != 0)

@@ -10,7 +10,7 @@
 
 /* |P|^2.
  *
- * By this much the energy of white noise grows from the folds to y. */
+ * This is the factor by which the energy of white noise grows from the folds to y. */
 static eits_real energy_of(const eits_context *ctx, eits_real *copy)
 {
     const eits_matrix *p = &ctx->model->reduction;
@@ -27,7 +27,8 @@ void eits_whitening_init(eits_context *ctx, const eits_scratch *scratch)
     const eits_row_form *form = &ctx->model->row_form;
     ctx->whitening.energy = ctx->whitening.energy_stored = energy_of(ctx, scratch->row[3]);
     ctx->whitening.possible = form->scale != NULL;
-    /* To reals once: a core in double would convert them in every frame. */
+    /* The numbers are converted to reals once: a core in double would otherwise convert them in
+     * every frame. */
     for (uint32_t i = 0; ctx->whitening.possible && i < ctx->model->rank; ++i) {
         ctx->whitening.row_scale[i] = (eits_real)form->scale[i];
         ctx->whitening.row_strength[i] = (eits_real)form->strength[i];
@@ -44,10 +45,10 @@ static int in_use(const eits_context *ctx, uint32_t k)
 
 /* N = U_o' U_o + e I, summed over whichever rows are fewer, those left out or those in use.
  *
- * The observed rows' part of U: U = P'diag(1/w), whose columns are orthonormal over all rows, so
- * the sum over the rows that are left out gives the same matrix as the identity less that over
- * those that are not. Whichever has fewer terms costs less, and rounds less. The small e keeps a
- * direction that no row sees from making the matrix singular: it is then held near zero instead. */
+ * U = P'diag(1/w) has orthonormal columns over all rows, so the identity minus the sum over the
+ * rows left out is the same matrix as the sum over the rows in use, U_o. The one with fewer terms
+ * costs less and rounds less. The small e keeps a direction that no row sees from making the matrix
+ * singular: such a direction is held near zero instead. */
 static uint64_t sum_products(eits_context *ctx, const eits_scratch *scratch, uint32_t missing,
                              eits_real lost, eits_real *n)
 {
@@ -167,16 +168,16 @@ eits_real eits_lambda_noise(const eits_context *ctx)
     return ctx->whitening.noise_ratio * ctx->reference.lambda_noise;
 }
 
-/* One reference frame tells no noise, but its rounding is known. */
+/* A single reference frame shows no noise, but its rounding is known. */
 eits_real eits_detection_threshold(const eits_context *ctx)
 {
     const eits_real least = eits_lambda_noise_floor(ctx), learned = ctx->reference.lambda_noise;
     return ctx->options.detection_factor * ctx->whitening.noise_ratio * eits_larger(learned, least);
 }
 
-/* No row is left out: the regularisation alone may differ.
+/* Raise the regularisation if the noise asks for it; no row is left out here.
  *
- * With all rows in use the directions do not mix: F is one weight for each, and costs next to
+ * With all rows in use the directions do not mix: F is one weight per direction and costs almost
  * nothing. */
 static void raise_regularisation(eits_context *ctx)
 {
@@ -220,8 +221,8 @@ static uint64_t build_triangle(eits_context *ctx, const eits_scratch *scratch,
     return macs;
 }
 
-/* What the frame needs, in order of what it costs: nothing, weights, triangles. Called when the
- * sides, the reference or the options have changed; not for every frame. */
+/* Build the cheapest whitening that the frame needs: none, weights or triangles. This is called
+ * when the sides, the reference or the options have changed, not for every frame. */
 uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch)
 {
     const uint32_t folded = ctx->model->n_folded;
@@ -248,13 +249,13 @@ uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch)
     return 0;
 }
 
-/* R'^-1 is had from what is kept: R = G F diag(w) but for F's scale, so y = G^-1 G'^-1 F'^-1
- * diag(1/w^2) P_o d_o. */
+/* R'^-1 follows from the triangles that are kept: R = G F diag(w) except for F's scale, so y = G^-1
+ * G'^-1 F'^-1 diag(1/w^2) P_o d_o. */
 uint64_t eits_whiten_data(eits_context *ctx, eits_real *v)
 {
     if (ctx->whitening.form == EITS_WHITENING_DIAGONAL)
         return eits_whiten(ctx, v);
-    if (!ctx->whitening.possible) { /* a taught model: the rows left out are filled in by now */
+    if (!ctx->whitening.possible) { /* a taught model: the rows left out have been filled in */
         eits_triangle_solve_transposed(ctx, ctx->whitening.map, v);
         return triangle_macs(ctx);
     }

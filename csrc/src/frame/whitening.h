@@ -1,6 +1,6 @@
-/* Rows left out of a frame: the reduction that the model would have had without them, in the stored
- * model's coordinates; and with all rows that of a higher regularisation (regularisation.c), where
- * F is diagonal.
+/* Whitening for rows left out of a frame: F gives the reduction that the model would have had
+ * without them, in the stored model's coordinates. With all rows in use, F is diagonal and gives
+ * the reduction of a higher regularisation (regularisation.c).
  *
  * The builder makes P = diag(w) U' and S = diag(s w) V' with w = (s^2 + mu s_1^2)^-1/2
  * (docs/reference/eitm-format.md, "Reduction"). Of U the rows U_o are left, U_o'
@@ -12,8 +12,8 @@
 
 #include "context/context.h"
 
-/* How the model was whitened, where it says so (eits_row_form). Otherwise rows left out are
- * minimised over instead (fold.c). Uses scratch->row[3]. */
+/* Read how the model was whitened, if it has eits_row_form. Otherwise the residual is minimised
+ * over the rows left out (fold.c). Uses scratch->row[3]. */
 void eits_whitening_init(eits_context *ctx, const eits_scratch *scratch);
 
 /* Make the whitening for the folded rows that frame.sides has; sets whitening.form.
@@ -22,24 +22,24 @@ uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch);
 
 /* ---- rows_out.c: taught models ---- */
 
-/* F for a taught model that lacks rows, at most `rank` of them. Uses scratch->index, row[3] and
- * square; sets whitening.form. Returns the multiply-accumulates. */
+/* Build F for a taught model without the rows left out, at most `rank` of them. Uses
+ * scratch->index, row[3] and square; sets whitening.form. Returns the multiply-accumulates. */
 uint64_t eits_fill_build(eits_context *ctx, const eits_scratch *scratch);
 
-/* While such an F is in force: add to y = P d what the rows left out are expected to be by the
- * `given` others, scratch->index and value; else nothing. Uses scratch->square. */
+/* While such an F is in force, add to y = P d the values of the rows left out that are expected
+ * from the `given` others, scratch->index and value; else do nothing. Uses scratch->square. */
 uint64_t eits_fill_rows(eits_context *ctx, const eits_scratch *scratch, uint32_t given,
                         eits_real *y);
 
-/* lambda_noise for the rows in use. */
+/* Returns lambda_noise for the rows in use. */
 eits_real eits_lambda_noise(const eits_context *ctx);
 
-/* max(S'y) of a frame, or of a touch, below which there is none: options.detection_factor times
- * lambda_noise, or the floor of noise where that is more. */
+/* Returns the detection threshold, the smallest max(S'y) of a frame or a touch that counts:
+ * options.detection_factor times lambda_noise, or times the noise floor if that is larger. */
 eits_real eits_detection_threshold(const eits_context *ctx);
 
-/* While whitening.form: P d of the rows in use (stride numbers) becomes the data that F S x
- * is to meet. */
+/* While whitening.form is set, P d of the rows in use (stride numbers) becomes the data for F S x.
+ */
 uint64_t eits_whiten_data(eits_context *ctx, eits_real *v);
 
 /* While whitening.form is EITS_WHITENING_TRIANGLE: the k-th of `rank` directions (stride numbers)
@@ -72,18 +72,18 @@ uint64_t eits_adjoint_macs(const eits_context *ctx);
  * regularisation mu' > mu has each row of P and S multiplied by D_i = sqrt((s_i^2 + mu s_1^2) /
  * (s_i^2 + mu' s_1^2)), but for a common factor: the whitening F = D, where no row is left out. */
 
-/* mu' with all rows in use: the model's, or regularisation_noise_factor times the noise over the
- * reference's rms where that is more. */
+/* Returns mu' with all rows in use: the model's, or regularisation_noise_factor times the noise
+ * over the reference's rms if that is larger. */
 eits_real eits_regularisation_of_all(const eits_context *ctx);
 
-/* mu' where the fraction `missing` of the folded rows is left out. */
+/* Returns mu' if the fraction `missing` of the folded rows is left out. */
 eits_real eits_regularisation_of_rest(const eits_context *ctx, eits_real missing);
 
-/* How much noise of the rows max(S'y) has with the regularisation mu' and all rows, over that with
- * the model's; for models of the builder's form. */
+/* Returns the factor on the rows' noise in max(S'y) of the regularisation mu' against the model's,
+ * with all rows in use; for models of the builder's form. */
 eits_real eits_regularisation_noise(const eits_context *ctx, eits_real regularisation);
 
-/* D (stride numbers); returns how much noise of the rows |y|^2 has so, over that with the model's
+/* Computes D (stride numbers); returns the factor on the rows' noise in |y|^2 against the model's
  * regularisation. */
 eits_real eits_regularisation_weights(const eits_context *ctx, eits_real regularisation,
                                       eits_real *weight);

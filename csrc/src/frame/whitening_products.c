@@ -1,10 +1,10 @@
-/* How F (whitening.h) is applied, whatever it is: not at all, by a weight a direction, or by an
- * upper triangle where rows are left out.
+/* Apply F (whitening.h) in each of its forms: not at all, as a weight per direction, or as an upper
+ * triangle if rows are left out.
  *
- * The solvers do not know which; they ask for F v, F'v, Q F v and the residual, and for what each
- * costs, and the three forms differ only here. F is applied to the `rank` numbers S x, never to S:
- * rank^2 / 2 multiply-accumulates at most, where a changed S would cost n_pixels times that and
- * memory that a board has not. */
+ * The solvers do not know the form; they ask for F v, F'v, Q F v and the residual, and for the cost
+ * of each, and the three forms differ only here. F is applied to the `rank` numbers S x, never to
+ * S: this costs rank^2 / 2 multiply-accumulates at most, while a changed S would cost n_pixels
+ * times that, and memory that a board does not have. */
 #include "base/vec.h"
 #include "context/projection.h"
 #include "context/triangle.h"
@@ -13,7 +13,7 @@
 
 /* out = D v.
  *
- * Over the whole stride, whose padding is zeros: a loop without a remainder. */
+ * The loop runs over the whole stride, whose padding is zeros: it needs no remainder. */
 static void weigh(const eits_context *ctx, const eits_real *v, eits_real *out)
 {
     const eits_real *weight = ctx->whitening.map;
@@ -21,8 +21,8 @@ static void weigh(const eits_context *ctx, const eits_real *v, eits_real *out)
         out[i] = weight[i] * v[i];
 }
 
-/* In place, from the first row down: row i of an upper triangle needs v from i on. What it
- * reads before i, to begin at a whole vector, meets zeros. */
+/* F is applied in place, from the first row down: row i of an upper triangle needs v from i on. To
+ * begin at a whole vector it also reads numbers before i; they meet zeros. */
 uint64_t eits_whiten(const eits_context *ctx, eits_real *v)
 {
     if (ctx->whitening.form == EITS_WHITENING_DIAGONAL)
@@ -68,7 +68,7 @@ uint64_t eits_forward_macs(const eits_context *ctx)
 
 const eits_real *eits_adjoint(const eits_context *ctx, const eits_real *v, eits_real *room)
 {
-    /* F is the identity: no copy, and none of its time. */
+    /* F is the identity: no copy is made, and none of its time is spent. */
     if (!ctx->whitening.form)
         return v;
     if (ctx->whitening.form == EITS_WHITENING_DIAGONAL) {
