@@ -15,11 +15,11 @@
 extern "C" {
 #endif
 
-/* Bytes of a head; and of the longest packet before it is stuffed, for a decoder's buffer. */
+/* Bytes of a head, and of the longest packet before it is stuffed, for a decoder's buffer. */
 #define EITS_LINK_HEAD       8u
 #define EITS_LINK_MAX_PACKET (EITS_LINK_HEAD + EITS_LINK_MAX_PAYLOAD + 4u)
-/* Bytes on the wire at most for a payload of `size` bytes: COBS adds one byte in 254, and the two
- * zeros. */
+/* The maximum of bytes on the wire for a payload of `size` bytes: COBS adds one byte in 254, and
+ * the two zeros come on top. */
 #define EITS_LINK_ENCODED(size) \
     ((size_t)(size) + EITS_LINK_HEAD + 4u + ((size_t)(size) + EITS_LINK_HEAD + 4u) / 254u + 3u)
 
@@ -29,7 +29,8 @@ extern "C" {
 size_t eits_link_encode(uint8_t *out, size_t room, uint8_t type, uint32_t sequence,
                         const void *head, size_t head_size, const void *body, size_t body_size);
 
-/* One packet whose checksum, version and length fit; its payload's content is not checked. */
+/* A packet whose checksum, version and length are right; the content of its payload is not checked.
+ */
 typedef struct eits_link_packet {
     uint8_t type;      /* eits_packet_type, or a number that this version does not know */
     uint32_t sequence; /* counts what the other side sent or dropped, modulo 2^32 */
@@ -42,14 +43,14 @@ typedef struct eits_link_packet {
 typedef struct eits_link_decoder {
     uint8_t *buffer;   /* 8-byte aligned */
     size_t room, used; /* bytes of the buffer, and those of the packet so far */
-    /* of the COBS block: bytes still to come, its code; of the packet: begun, too long */
+    /* the COBS block's missing bytes and code; 1 if a packet has begun; 1 if it is too long */
     uint8_t left, code, in_packet, broken;
     uint32_t packets;        /* accepted */
     uint32_t crc_errors;     /* whole COBS frames whose checksum does not fit */
     uint32_t framing_errors; /* ended inside a COBS block, or shorter than head and checksum */
     uint32_t overruns;       /* longer than the buffer */
     uint32_t version_errors; /* checksum fits, but of another protocol version */
-    uint8_t other_version;   /* the last such */
+    uint8_t other_version;   /* the last version that did not match */
 } eits_link_decoder;
 
 /* Start with an empty decoder; call it again where the line was cut, which also clears the
@@ -57,9 +58,9 @@ typedef struct eits_link_decoder {
  * Errors: EITS_E_ARGUMENT (no buffer, not 8-byte aligned, or room below EITS_LINK_HEAD + 4). */
 eits_status eits_link_decoder_init(eits_link_decoder *decoder, uint8_t *buffer, size_t room);
 
-/* Take bytes until a packet is whole or they end. Returns how many were taken; `packet->payload` is
- * NULL if none is whole. Call it again with the rest until all are taken: what is not a packet is
- * counted and passed over. */
+/* Take bytes until a packet is complete or they end. Returns how many were taken; `packet->payload`
+ * is NULL if no packet is complete. Call it again with the rest until all are taken: bytes that
+ * form no packet are counted and skipped. */
 size_t eits_link_feed(eits_link_decoder *decoder, const uint8_t *bytes, size_t size,
                       eits_link_packet *packet);
 
