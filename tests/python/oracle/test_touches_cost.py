@@ -97,14 +97,14 @@ def test_the_cores_discs_fit_the_data_less_what_they_do_to_each_other():
     """With the whole touch fit, three touches at 60 dB: the oracle takes the interaction of the
     core's discs out of the data. Then the discs cost at most 1e-4 of |y|^2 more than the best near
     them; the interaction itself is many times that."""
-    quiet_v, frames_v = scenes(3, 60.0)
+    untouched_v, frames_v = scenes(3, 60.0)
     model, options = prebuilt()[0], {"touch_test": 0, "row_gains": 0}
     core = Reconstructor(model, engine="c64", blob=prebuilt()[1])
     oracle, added, above = OracleEngine(model), [], []
     core.set_options(**options)
     oracle.set_options(core.options)
-    core.tare(quiet_v)
-    oracle.set_reference(quiet_v)
+    core.tare(untouched_v)
+    oracle.set_reference(untouched_v)
     for frame in frames_v:
         core.forget()
         seen = oracle.explain(frame)
