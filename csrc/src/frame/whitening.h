@@ -3,9 +3,9 @@
  * the reduction of a higher regularisation (regularisation.c).
  *
  * The builder makes P = diag(w) U' and S = diag(s w) V' with w = (s^2 + mu s_1^2)^-1/2
- * (docs/reference/eitm-format.md, "Reduction"). Of U the rows U_o are left, U_o'
- * U_o + e I = R'R with R upper triangular, and G G' = R diag(s^2) R' + mu' s_1^2 I,   F = G^-1 R
- * diag(1/w),   y = G^-1 R'^-1 diag(1/w) P_o d_o: |y - F S x|^2 is the residual that a reduction of
+ * (docs/reference/eitm-format.md, "Reduction"). U_o has the rows of U that are in use, and U_o' U_o
+ * + e I = R'R with R upper triangular. With G G' = R diag(s^2) R' + mu' s_1^2 I, F = G^-1 R
+ * diag(1/w) and y = G^-1 R'^-1 diag(1/w) P_o d_o, |y - F S x|^2 is the residual that a reduction of
  * those rows with the regularisation mu' would have. F and G are upper triangular, too. */
 #ifndef EITSKIN_WHITENING_H
 #define EITSKIN_WHITENING_H
