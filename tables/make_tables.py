@@ -10,7 +10,7 @@ their ``rows`` are members:
 - of an enum: name, number, what it means; where needed, further columns that the enum's table names
 - of a struct: name, type, what it is; where Python has it in another form, that form (FORMS in
   ``write_python.py``)
-- of ``[options]``: name, type, usual value, least, greatest, what it is
+- of ``[options]``: name, type, default value, least, greatest, what it is
 - of a group in ``constants.toml``: name, value, unit, what it is, what it trades; the group says
   how its numbers were chosen, and what checks them
 """

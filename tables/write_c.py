@@ -125,13 +125,15 @@ def _has_texts(enum: Table) -> bool:
 
 
 def c_options(tables: Tables) -> Iterator[tuple[str, Lines]]:
-    """Ranges and usual values of the options."""
+    """Ranges and default values of the options."""
     yield "csrc/src/model/options_table.h", _options_table(tables)
 
 
 def _options_table(tables: Tables) -> Lines:
     rows = tables["options"]["options"]["rows"]
-    yield from comment(f"Ranges and usual values, included by options.c alone. {origin('options')}")
+    yield from comment(
+        f"Ranges and default values, included by options.c alone. {origin('options')}"
+    )
     yield from (
         "/* clang-format off */",
         "#define OPTION(name, whole, least, greatest) \\",
@@ -146,9 +148,11 @@ def _options_table(tables: Tables) -> Lines:
     yield from comment("What depends on more of a model than its defaults is 0 here.")
     yield "static eits_options usual_options(const eits_defaults *d)"
     yield from ("{", "    return (eits_options){")
-    for name, kind, usual, *_ in rows:
+    for name, kind, default, *_ in rows:
         cast = "eits_real" if kind == "real" else kind if kind.startswith("eits_") else "uint32_t"
-        value = f"d->{name}" if usual == "model" else "0" if usual == "rule" else number(usual)
+        value = (
+            f"d->{name}" if default == "model" else "0" if default == "rule" else number(default)
+        )
         yield f"        .{name} = ({cast}){value},"
     yield from ("    };", "}", "/* clang-format on */")
 

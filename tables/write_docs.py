@@ -68,9 +68,9 @@ def _values(enum: Table) -> Lines:
 
 
 def _options(options: Table, limits: Table) -> Lines:
-    for name, kind, usual, least, greatest, doc in options["rows"]:
+    for name, kind, default, least, greatest, doc in options["rows"]:
         most = limits.get(str(greatest).removeprefix("EITS_"), greatest)
         span = f"from {least}" if greatest in ("any", "huge") else f"{least} to {most}"
-        shown = str(usual).replace("EITS_", "").replace("SIGN_", "").lower()
+        shown = str(default).replace("EITS_", "").replace("SIGN_", "").lower()
         shown += f"; {span}" if kind in ("u32", "real") else ""
         yield from wrapped(plain(doc), f"- `{name}` ({shown}): ", "  ")

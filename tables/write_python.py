@@ -135,8 +135,8 @@ def _options_module(tables: Tables) -> Lines:
     yield from ("", "", "@dataclass(frozen=True)", "class OptionFields:")
     yield from docstring(table["doc"], "    ")
     yield ""
-    for name, kind, usual, _, _, doc in rows:
-        yield from said(f"    {name}: {_option_type(kind)}{_usual(tables, kind, usual)}", doc)
+    for name, kind, default, _, _, doc in rows:
+        yield from said(f"    {name}: {_option_type(kind)}{_default(tables, kind, default)}", doc)
     yield from ("", "", *remark("Least and greatest value of each option that is a number."))
     yield "RANGES: dict[str, tuple[float, float]] = {"
     for name, kind, _, least, greatest, _ in table["rows"]:
@@ -163,16 +163,16 @@ def _option_type(kind: str) -> str:
     return plain.get(kind, "int" if kind.startswith("bits ") else "str")
 
 
-def _usual(tables: Tables, kind: str, usual: Any) -> str:
-    if usual in ("model", "rule"):
+def _default(tables: Tables, kind: str, default: Any) -> str:
+    if default in ("model", "rule"):
         return ""
     if kind.startswith("eits_"):
         prefix = enum_of(tables, kind)["prefix"]
-        return f' = "{word(usual.removeprefix(prefix))}"'
+        return f' = "{word(default.removeprefix(prefix))}"'
     if kind.startswith("bits "):
         return f" = {all_name(enum_of(tables, kind[5:]))}"
     types = {"flag": bool, "real": float}
-    return f" = {types[kind](usual)}" if kind in types else f" = {_limit(usual)}"
+    return f" = {types[kind](default)}" if kind in types else f" = {_limit(default)}"
 
 
 def _limit(value: Any) -> str:

@@ -28,7 +28,7 @@ class Breathing(Source):
         self._next_s = time.monotonic()
 
     def use_model(self, model: Model) -> None:
-        self._quiet_v = model.golden.reference_v
+        self._untouched_v = model.golden.reference_v
 
     def read(self, timeout_s: float) -> list[GivenFrame]:
         wait_s = self._next_s - time.monotonic()
@@ -37,7 +37,7 @@ class Breathing(Source):
             return []
         self._next_s += self.period_s
         breath = 1 + 1e-3 * math.sin(2 * math.pi * 0.2 * self._next_s)
-        return [GivenFrame(self._quiet_v / breath)]
+        return [GivenFrame(self._untouched_v / breath)]
 
 
 def open_source(rest: str) -> Breathing:

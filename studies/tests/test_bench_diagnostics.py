@@ -16,8 +16,8 @@ from eitskin_studies.benchmarks import diagnostics as bench_diagnostics
 from eitskin_studies.benchmarks.diagnostics_faults import DETACHED, FAULTS, NONE, OUTLIER
 from eitskin_studies.benchmarks.diagnostics_scenes import (
     IMPERFECT,
-    QUIET_FRAMES,
     ROWS,
+    UNTOUCHED_FRAMES,
     CaseMaker,
     drawn,
     swapped,
@@ -82,7 +82,9 @@ def test_counts_are_those_of_the_frames(result):
         off = np.isin(ROWS, case.electrode).any(axis=1)
         assert (case.volts["detached"][off] == 0).all()
         assert (case.volts["detached"][~off] != 0).all()
-        solver.tare(case.measured(np.tile(case.volts["quiet"], (QUIET_FRAMES, 1)), 60.0, "quiet"))
+        solver.tare(
+            case.measured(np.tile(case.volts["quiet"], (UNTOUCHED_FRAMES, 1)), 60.0, "quiet")
+        )
         noisy = case.measured(case.volts["detached"][None], 60.0, "frame")[0]
         named += solver.reconstruct(noisy).info.open_electrodes == (case.electrode,)
     assert named / SCENES == rate(result, DETACHED)["named"]

@@ -1,4 +1,4 @@
-"""Gestures drawn, simulated, told and judged."""
+"""Gestures drawn, simulated, reported and judged."""
 
 from collections import Counter
 
@@ -11,7 +11,7 @@ from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.gestures import bench
 from eitskin_studies.gestures.drawn import EACH, KINDS, RIM_MM, DrawnGesture, DrawnSession
 from eitskin_studies.gestures.drawn import draw_session as draw
-from eitskin_studies.gestures.judged import GestureCount, ToldGesture, judge, told_gestures
+from eitskin_studies.gestures.judged import GestureCount, ReportedGesture, judge, reported_gestures
 from eitskin_studies.gestures.simulated import RATE_HZ, Simulator, found_touches
 
 
@@ -36,8 +36,8 @@ def test_simulated_gestures_are_told_and_kept(tmp_path):
     assert exact_v.shape == (1 + int(np.ceil(session.duration_s * RATE_HZ)), 208)
     assert np.array_equal(exact_v, simulator.exact_v(session, 1))  # from the cache
     skin = Reconstructor(model, blob=blob)
-    told = told_gestures(found_touches(skin, exact_v, 60.0, 1, session.name), Gestures())
-    count = judge(session, told)
+    reported = reported_gestures(found_touches(skin, exact_v, 60.0, 1, session.name), Gestures())
+    count = judge(session, reported)
     assert (count.gestures, count.right_gestures, count.invented.total()) == (2, 2, 0)
     assert max(max(late) for late in count.late_s.values()) < 0.05
     settings = bench.Settings(1, 1, "judging", (60.0,))
@@ -54,22 +54,22 @@ def done(*kinds: str) -> DrawnSession:
     return DrawnSession("made", made, float(len(kinds)))
 
 
-def told(kind: str, at_s: float, direction_deg: float = 0.0) -> ToldGesture:
-    return ToldGesture(kind, at_s, at_s, direction_deg)
+def reported(kind: str, at_s: float, direction_deg: float = 0.0) -> ReportedGesture:
+    return ReportedGesture(kind, at_s, at_s, direction_deg)
 
 
 @pytest.mark.parametrize(
     ("kinds", "what", "right", "invented"),
     [
-        (("tap",), [told("tap", 0.52)], 1, {}),
-        (("tap",), [told("tap", 0.8)], 0, {"tap": 1}),  # too late to be its own
-        (("tap",), [told("tap", 0.5), told("tap", 0.6)], 0, {"tap": 1}),
-        (("double-tap",), [told("tap", 0.2), told("double-tap", 0.5)], 1, {}),
-        (("double-tap",), [told("tap", 0.2)], 0, {}),
-        (("swipe",), [told("swipe", 0.5, 350.0)], 1, {}),
-        (("swipe",), [told("swipe", 0.5, 45.0)], 0, {}),
-        (("drag", "hold"), [told("swipe", 0.5), told("hold", 1.5)], 1, {"swipe": 1}),
-        (("pinch",), [told("rotate", 0.3)], 0, {"rotate": 1}),
+        (("tap",), [reported("tap", 0.52)], 1, {}),
+        (("tap",), [reported("tap", 0.8)], 0, {"tap": 1}),  # too late to be its own
+        (("tap",), [reported("tap", 0.5), reported("tap", 0.6)], 0, {"tap": 1}),
+        (("double-tap",), [reported("tap", 0.2), reported("double-tap", 0.5)], 1, {}),
+        (("double-tap",), [reported("tap", 0.2)], 0, {}),
+        (("swipe",), [reported("swipe", 0.5, 350.0)], 1, {}),
+        (("swipe",), [reported("swipe", 0.5, 45.0)], 0, {}),
+        (("drag", "hold"), [reported("swipe", 0.5), reported("hold", 1.5)], 1, {"swipe": 1}),
+        (("pinch",), [reported("rotate", 0.3)], 0, {"rotate": 1}),
     ],
 )
 def test_what_is_right_and_what_is_invented(kinds, what, right, invented):

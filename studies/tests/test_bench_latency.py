@@ -1,4 +1,4 @@
-"""``eitskin bench latency``: what counts as told, as false, as late; the page; a run."""
+"""``eitskin bench latency``: what counts as reported, as false, as late; the page; a run."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -9,15 +9,15 @@ import pytest
 from eitskin.model.eitm import load_model
 from eitskin.scene.description import load_scene
 from eitskin_studies.benchmarks import latency
-from eitskin_studies.benchmarks.latency import Press, Told, judge
+from eitskin_studies.benchmarks.latency import Press, Reported, judge
 from eitskin_studies.harness.sections import fill_marks
 from eitskin_studies.pictures.latency_picture import draw_latency
 from study_pages import page_copy
 
 
-def told(number: int, *places: tuple[float, float], named: str = "") -> Told:
+def reported(number: int, *places: tuple[float, float], named: str = "") -> Reported:
     """By the frame whose scan takes 20 ms from 20 ms times ``number``."""
-    return Told(0.02 * number, 0.02 * (number + 1), np.array(places).reshape(-1, 2),
+    return Reported(0.02 * number, 0.02 * (number + 1), np.array(places).reshape(-1, 2),
         (named,) if named else (), 8.0, 1.0, True)  # fmt: skip
 
 
@@ -25,17 +25,17 @@ def test_what_is_told_of_presses():
     presses = [Press(0.05, 0.0, 0.3, 0.0, 0.0), Press(0.61, 0.0, 0.9, 40.0, 0.0)]
     presses.append(Press(1.25, 0.0, 1.5, 0.0, 0.0))
     frames = [
-        told(0), told(3, (3.0, 4.0), named="outlier"), told(4, (0.0, 1.0)),
-        told(19, (0.0, 0.0)),  # 80 ms after the lift
-        told(31, (39.0, 0.0), (41.0, 0.0)), told(40, (40.0, 0.0), (0.0, 0.0)),
-        told(51, (40.0, 0.0)),  # 120 ms after the lift
+        reported(0), reported(3, (3.0, 4.0), named="outlier"), reported(4, (0.0, 1.0)),
+        reported(19, (0.0, 0.0)),  # 80 ms after the lift
+        reported(31, (39.0, 0.0), (41.0, 0.0)), reported(40, (40.0, 0.0), (0.0, 0.0)),
+        reported(51, (40.0, 0.0)),  # 120 ms after the lift
     ]  # fmt: skip
-    frames.insert(3, replace(told(5), frame=False))
+    frames.insert(3, replace(reported(5), frame=False))
     one = judge("m", 0, [(presses, frames)])
     assert (one.frames, one.frames_diagnosed) == (7, 1)
     assert one.scan_ms == pytest.approx((30.0, 30.0)) and one.error_mm == pytest.approx((5.0, 1.0))
     assert (one.missed, one.with_false, one.false_touches, one.diagnosed) == (1, 1, 3, 1)
-    early = judge("m", 0, [(presses[:1], [told(0, (0.0, 0.0)), told(1, (30.0, 0.0))])] * 2)
+    early = judge("m", 0, [(presses[:1], [reported(0, (0.0, 0.0)), reported(1, (30.0, 0.0))])] * 2)
     assert (early.with_false, early.false_touches, early.missed) == (2, 4, 2)
 
 

@@ -117,8 +117,8 @@ class Oracle:
     learned: list[np.ndarray] = field(default_factory=list)
     name: str = "oracle"
 
-    def learn(self, quiet_v: np.ndarray) -> None:
-        self.learned.append(quiet_v)
+    def learn(self, untouched_v: np.ndarray) -> None:
+        self.learned.append(untouched_v)
 
     def reconstruct(self, dv: np.ndarray) -> np.ndarray:
         scenes = random_touches(SKIN.outline, 3, len(dv), {6: "train", 8: "test"}[len(dv)]).scenes
@@ -142,9 +142,9 @@ def test_a_method_may_learn_and_may_find_touches_itself():
     assert result.exact_count == 1.0 and result.position_summary.p95 == 0.0
     assert result.hit_share == 1.0 and result.touch_threshold is None
     assert outcome.ceiling - 0.03 < result.miou_summary.mean <= outcome.ceiling + 1e-12
-    assert [len(quiet) for quiet in made[0].learned] == [64, 64]
-    assert (made[0].learned[0] == outcome.train.quiet_v).all()
-    assert (made[0].learned[1] == outcome.test.quiet_v).all()
+    assert [len(untouched) for untouched in made[0].learned] == [64, 64]
+    assert (made[0].learned[0] == outcome.train.untouched_v).all()
+    assert (made[0].learned[1] == outcome.test.untouched_v).all()
     assert "own touches" in dict(header(outcome))["positions"]
 
 
@@ -198,15 +198,15 @@ def test_noise_free_frames_do_no_worse(comparison):
 
 
 def test_progress_is_told_all_work():
-    told: list[tuple[str, int]] = []
+    reported: list[tuple[str, int]] = []
 
     def watch(items: Sequence[object], what: str) -> Sequence[object]:
-        told.append((what, len(items)))
+        reported.append((what, len(items)))
         return items
 
     few = replace(SMALL, scenes=2, train_scenes=1)
     compare(SKIN, PROTOCOL, few, families=quick, progress=watch)
-    assert told == [("simulating (train)", 1), ("simulating (test)", 2), ("reconstructing", 2)]
+    assert reported == [("simulating (train)", 1), ("simulating (test)", 2), ("reconstructing", 2)]
 
 
 def test_impossible_settings_are_refused():

@@ -37,7 +37,7 @@ def test_every_form_shows_and_finds_single_touches(setup, session):
     for family in core_methods(setup):
         method = family.make(family.values[0])
         assert isinstance(method, Learns) and isinstance(method, FindsTouches)
-        method.learn(session.quiet_v)
+        method.learn(session.untouched_v)
         images, found = method.reconstruct(dv), method.touches(dv)
         assert images.shape == (2, setup.grid.n_pixels) and images.min() >= 0
         for image, xy, place in zip(images, found, PLACES, strict=True):
@@ -49,13 +49,13 @@ def test_every_form_shows_and_finds_single_touches(setup, session):
 def test_frames_of_a_set_do_not_depend_on_their_order(setup, session):
     method = core_methods(setup)[0].make(0.0)
     assert isinstance(method, Learns)
-    method.learn(session.quiet_v)
+    method.learn(session.untouched_v)
     dv = session.differences_v()
     assert (method.reconstruct(dv[::-1].copy())[::-1] == method.reconstruct(dv)).all()
 
 
 def test_it_must_learn_first(setup):
-    with pytest.raises(UsageError, match="quiet frames"):
+    with pytest.raises(UsageError, match="untouched frames"):
         core_methods(setup)[0].make(0.0).reconstruct(np.zeros((1, 208)))
 
 

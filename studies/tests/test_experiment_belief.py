@@ -24,8 +24,8 @@ FRAMES: list[dict[str, Any]] = [
 def test_numbers_by_hand():
     covered, counted = coverage(FRAMES), counts(FRAMES)
     assert (covered.hits, covered.count) == (1, 2)
-    told = [(b.said, b.true.hits, b.true.count) for b in curve({"a": FRAMES})]
-    assert told == [(0.6, 0, 1), (0.97, 1, 1), (0.999, 1, 1)]
+    reported = [(b.said, b.true.hits, b.true.count) for b in curve({"a": FRAMES})]
+    assert reported == [(0.6, 0, 1), (0.97, 1, 1), (0.999, 1, 1)]
     found = counted.right, counted.said_right, counted.said_wrong, counted.honest
     assert [(one.hits, one.count) for one in found] == [(2, 4), (1, 2), (1, 2), (3, 4)]
 

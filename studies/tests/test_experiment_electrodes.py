@@ -126,7 +126,7 @@ def test_scenes_are_solved_once_for_every_pattern(monkeypatch, tmp_path):
     for pattern in ("adjacent", "skip 2", "opposite"):
         for equal in ("noise", "time"):
             shop.frames("random", measuring.usual_case(16, pattern, equal), 1e-4)
-    parts = len(shop.sets)  # a quiet frame each
+    parts = len(shop.sets)  # an untouched frame each
     assert len(solved) == sum(len(drawn.scenes) for drawn in shop.sets.values()) + parts
 
 

@@ -10,7 +10,13 @@ import pytest
 from eitskin_studies.experiments import force
 from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.force import anywhere, detection, scenes, sheet
-from eitskin_studies.experiments.force.law import GEL_LIMIT_KPA, LOADS_G, NOMINAL, SHEET, drawn_laws
+from eitskin_studies.experiments.force.law import (
+    GEL_LIMIT_KPA,
+    NOMINAL,
+    SHEET,
+    WEIGHTS_G,
+    drawn_laws,
+)
 from eitskin_studies.experiments.force.readouts import (
     PEAK,
     READOUTS,
@@ -52,13 +58,13 @@ def test_the_peak_falls_towards_the_centre_and_the_strength_does_not(done):
 
 
 def test_calibrated_touches_read_one_load_alike(done):
-    told = {
+    errors = {
         (one["reading"], one["snr_db"]): anywhere.Anywhere.from_dict(one)
         for one in done[1].data["anywhere"]
     }
-    assert set(told) == {(name, snr) for name in READOUTS for snr in force.SNRS_DB}
-    touch, peak = told[TOUCH, 72.0], told[PEAK, 72.0]
-    assert touch.found == 1 and touch.calibrated.shape == (8, len(LOADS_G)) and touch.macs > 1e5
+    assert set(errors) == {(name, snr) for name in READOUTS for snr in force.SNRS_DB}
+    touch, peak = errors[TOUCH, 72.0], errors[PEAK, 72.0]
+    assert touch.found == 1 and touch.calibrated.shape == (8, len(WEIGHTS_G)) and touch.macs > 1e5
     assert anywhere.scatter(touch.calibrated) < 0.1 < 0.2 < anywhere.scatter(peak.raw)
 
 
@@ -69,7 +75,7 @@ def test_less_noise_shows_less_load(done):
     assert thresholds[-1, 0] > thresholds[-1, 3]  # the centre needs more
     for one in found:
         share, upper = one.false_share()
-        assert share < upper <= 1 and one.quiet == 80
+        assert share < upper <= 1 and one.untouched == 80
 
 
 def test_under_the_sheet_the_peak_rises_outwards_and_means_see_less(done):
@@ -114,11 +120,11 @@ def test_tuning_and_reported_places_differ():
 
 def test_the_least_load_lies_between_two():
     loads = np.array([1.0, 4.0, 16.0])
-    assert detection.least_load(loads, np.array([0.0, 0.8, 1.0])) == pytest.approx(8.0)
-    assert detection.least_load(loads, np.array([0.95, 1.0, 1.0])) == 1.0
-    assert detection.least_load(loads, np.array([0.95, 1.0, 0.5])) == float("inf")
+    assert detection.least_weight(loads, np.array([0.0, 0.8, 1.0])) == pytest.approx(8.0)
+    assert detection.least_weight(loads, np.array([0.95, 1.0, 1.0])) == 1.0
+    assert detection.least_weight(loads, np.array([0.95, 1.0, 0.5])) == float("inf")
     # once seen is not always seen
-    assert detection.least_load(loads, np.array([0.95, 0.5, 1.0])) > 4.0
+    assert detection.least_weight(loads, np.array([0.95, 0.5, 1.0])) > 4.0
 
 
 def test_false_alarms_have_the_exact_bound():

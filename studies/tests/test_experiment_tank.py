@@ -120,7 +120,7 @@ def test_simulated_noise_is_the_share_of_each_change(tmp_path):
     shop = workspace(tmp_path)
     raster = metrics.raster_inside(tank()[0].outline, 5.0)
     clean, noisy = (simulated(shop, 1, 4, True, raster, share) for share in (0.0, 0.05))
-    change = clean.frames_v - clean.quiet_v
+    change = clean.frames_v - clean.untouched_v
     noise = noisy.frames_v - clean.frames_v
     shares = np.sqrt((noise**2).mean(axis=1) / (change**2).mean(axis=1))
     assert shares == pytest.approx(np.full(4, 0.05), rel=0.2)

@@ -82,17 +82,17 @@ def at(number: int, x_mm: float) -> Touch:
 
 def test_what_is_counted():
     """Two fingers, at 0 mm in frames 2 to 9 and at 60 mm in frames 4 to 9; twelve frames are
-    told."""
+    reported."""
     stream = TouchStream("two", 0, (finger(2, 9, 0.0), finger(4, 9, 60.0)))
-    told: list[tuple[Touch, ...]] = [()] * 12
-    told[1] = (at(1, 0.0),)  # false: nobody is there yet
+    reported: list[tuple[Touch, ...]] = [()] * 12
+    reported[1] = (at(1, 0.0),)  # false: nobody is there yet
     for k in range(3, 10):
-        told[k] = (at(2, 1.0),)
-    told[6] = (at(3, 1.0),)  # a switch there, and one back
-    told[5] += (at(9, -80.0),)
-    told[10] = (at(2, 1.0),)  # a ghost
-    told[8] += (at(4, 60.0),)
-    count = count_stream(stream, told, 120)
+        reported[k] = (at(2, 1.0),)
+    reported[6] = (at(3, 1.0),)  # a switch there, and one back
+    reported[5] += (at(9, -80.0),)
+    reported[10] = (at(2, 1.0),)  # a ghost
+    reported[8] += (at(4, 60.0),)
+    count = count_stream(stream, reported, 120)
     found = count.frames, count.true, count.missed, count.false_touches, count.switches
     assert found == (12, 14, 6, 3, 2)
     assert count.exact == 4  # frames 0, 3, 8, 11
@@ -105,8 +105,8 @@ def test_what_is_counted():
 
 def test_an_id_that_goes_on_as_another_finger_is_no_ghost():
     stream = TouchStream("handed on", 0, (finger(0, 4, 0.0), finger(5, 9, 20.0)))
-    told = [(at(1, 0.0),)] * 5 + [(at(1, 20.0),)] * 5
-    assert count_stream(stream, told, 0).ghost == [0, 0]
+    reported = [(at(1, 0.0),)] * 5 + [(at(1, 20.0),)] * 5
+    assert count_stream(stream, reported, 0).ghost == [0, 0]
 
 
 def test_the_best_pairs_may_not_be_the_nearest():

@@ -34,7 +34,7 @@ def test_scenes_depend_on_family_seed_and_number_alone(factory):
     other = factory.scenes("fingers_mild_errors", 1, 3, family="judging")
     assert np.array_equal(few.frames_v[0], more.frames_v[0]) and few.scenes[0] == more.scenes[0]
     assert few.scenes[0].touches[0] != other.scenes[0].touches[0]
-    assert not np.array_equal(few.quiet_v, other.quiet_v)
+    assert not np.array_equal(few.untouched_v, other.untouched_v)
 
 
 def test_kept_frames_are_those_that_were_simulated(factory, tmp_path):
@@ -64,19 +64,19 @@ def test_drawn_touches_are_within_the_ranges_of_their_set(name):
 
 def test_each_error_changes_the_frames_that_it_should(factory):
     even = factory.scenes("no_touch_amplitude_drift_1_percent", 1, 2)
-    ratio = even.frames_v[0] / even.quiet_v[0].mean(axis=0)
+    ratio = even.frames_v[0] / even.untouched_v[0].mean(axis=0)
     large = np.abs(even.frames_v[0]) > 0.1 * np.abs(even.frames_v[0]).max()
     assert 1e-4 < abs(np.median(ratio[large]) - 1) < 0.04
     bare = factory.scenes("no_touch_noiseless", 1, 2)
-    assert np.ptp(bare.quiet_v[0], axis=0).max() == 0
-    assert 1e-9 < np.abs(bare.frames_v[0] / bare.quiet_v[0][0] - 1).max() < 1e-4
+    assert np.ptp(bare.untouched_v[0], axis=0).max() == 0
+    assert 1e-9 < np.abs(bare.frames_v[0] / bare.untouched_v[0][0] - 1).max() < 1e-4
 
 
 def test_scores_count_exact_false_missed_and_refused_scenes(factory):
     of = factory.scenes("eight_at_4_radii", 4, 1)
     answers = iter(range(4))
 
-    def find(quiet_v, frame_v, step_v):
+    def find(untouched_v, frame_v, step_v):
         k = next(answers)
         if k == 3:
             raise FrameError("rejected")

@@ -36,7 +36,7 @@ TINY = RunSettings(6, 4, 2, ("pairs", "drift"), (40.0, 60.0), 5, ELEMENTS, 0, 2,
 WARM = {"warm_start": True, "scan": "reciprocal", "storage": "i8"}
 PAIR = (
     Configuration("cheap", rank=24, pixels=14, iterations=8),
-    Configuration("dear", rank=48, pixels=24, iterations=60, lambda_rel=0.01),
+    Configuration("expensive", rank=48, pixels=24, iterations=60, lambda_rel=0.01),
     Configuration("warm", rank=48, pixels=24, iterations=15, **WARM),
 )
 
@@ -75,7 +75,7 @@ def front(folder) -> Front:
 
 
 def test_every_configuration_is_measured_on_every_set(front):
-    assert [one.name for one in front.points] == ["cheap", "dear", "warm"]
+    assert [one.name for one in front.points] == ["cheap", "expensive", "warm"]
     for one in front.points:
         of = {name: set(cells) for name, cells in one.scores.items()}
         assert of == {name: {"40", "60"} for name in ("random", "pairs", "drift")}
@@ -85,15 +85,15 @@ def test_every_configuration_is_measured_on_every_set(front):
         assert score["image"]["low"] <= score["image"]["mean"] <= score["image"]["high"]
         assert one.instructions is None or one.instructions["kind"] == "estimated"
         assert one.host_us is not None and 0 < one.host_us["p50"] <= one.host_us["p99"]
-    cheap, dear, warm = front.points
+    cheap, expensive, warm = front.points
     where = Conditions()
-    assert (cheap.accuracy(where) or 1) < (dear.accuracy(where) or 0)
-    assert (cheap.macs(where) or (9e9,))[0] < (dear.macs(where) or (0,))[0]
-    assert cheap.costs["flash_bytes"] < dear.costs["flash_bytes"]
-    assert warm.costs["flash_bytes"] < dear.costs["flash_bytes"]
-    assert (dear.costs["acquisition_us"], warm.costs["acquisition_us"]) == (20_800, 10_400)
-    assert dear.score(where)["iterations"] == 60
-    assert best_points(front.points, where) == [cheap, dear]
+    assert (cheap.accuracy(where) or 1) < (expensive.accuracy(where) or 0)
+    assert (cheap.macs(where) or (9e9,))[0] < (expensive.macs(where) or (0,))[0]
+    assert cheap.costs["flash_bytes"] < expensive.costs["flash_bytes"]
+    assert warm.costs["flash_bytes"] < expensive.costs["flash_bytes"]
+    assert (expensive.costs["acquisition_us"], warm.costs["acquisition_us"]) == (20_800, 10_400)
+    assert expensive.score(where)["iterations"] == 60
+    assert best_points(front.points, where) == [cheap, expensive]
 
 
 def test_tables_hold_a_row_a_cell(front):
@@ -104,7 +104,7 @@ def test_tables_hold_a_row_a_cell(front):
     assert all(line.count(",") == lines[0].count(",") for line in lines)
     again = front_from(json.loads(to_json(as_dict(front))), "file")
     assert comparable(again) == comparable(front)
-    assert "* dear" in to_text(front, Conditions())
+    assert "* expensive" in to_text(front, Conditions())
 
 
 def test_a_second_run_measures_nothing(front, folder):
@@ -138,7 +138,7 @@ def test_random_scenes_are_those_of_compare():
     touches, mesh = random_touches(SKIN.outline, 5, 3, "test"), mesh_for_elements(SKIN, ELEMENTS)
     theirs = simulate(SKIN, adjacent(16), touches, mesh=mesh)
     ours = session("random").measured(60.0, 80, "full", 1)
-    assert np.array_equal(ours.quiet_v, theirs.quiet_v)
+    assert np.array_equal(ours.untouched_v, theirs.untouched_v)
     assert np.array_equal(ours.frames_v[:, 0], theirs.frames_v)
     held = session("random").measured(60.0, 80, "full", 4)
     assert np.array_equal(held.frames_v[:, -1], theirs.frames_v)
@@ -155,7 +155,7 @@ def test_noise_falls_with_the_root_of_the_samples_and_stays_the_same_noise():
     assert noise[80].std() / noise[320].std() == pytest.approx(2, rel=0.1)
     assert np.corrcoef(noise[20].ravel(), noise[80].ravel())[0, 1] > 0.99
     fine = one.measured(80.0, 80, "full", 1).frames_v[:, 0] - one.exact_v
-    expected = np.sqrt((one.exact_quiet_v**2).mean()) * 1e-4
+    expected = np.sqrt((one.exact_untouched_v**2).mean()) * 1e-4
     assert fine.std() == pytest.approx(expected, rel=0.15)
 
 
@@ -166,7 +166,7 @@ def test_a_reciprocal_scan_copies_what_it_does_not_measure():
     assert np.array_equal(half.frames_v[..., fold.first], full.frames_v[..., fold.first])
     copies = fold.sign * full.frames_v[..., fold.first]
     assert np.array_equal(half.frames_v[..., fold.second], copies)
-    assert np.array_equal(half.quiet_v, copied(full.quiet_v, one.protocol))
+    assert np.array_equal(half.untouched_v, copied(full.untouched_v, one.protocol))
 
 
 @pytest.mark.parametrize("name", [name for name in SETS if name != "train"])
@@ -192,9 +192,9 @@ def test_sets_hold_what_they_say(name):
 def test_drift_is_in_the_frames_and_not_in_the_reference():
     drifting = session("drift")
     steady = replace(drifting, exact_v=drifting.exact_v)
-    assert np.array_equal(steady.exact_quiet_v, drifting.exact_quiet_v)
-    quiet_v = drifting.exact_quiet_v
-    assert np.ptp(drifting.exact_v @ quiet_v / (quiet_v @ quiet_v)) > 0.002
+    assert np.array_equal(steady.exact_untouched_v, drifting.exact_untouched_v)
+    untouched_v = drifting.exact_untouched_v
+    assert np.ptp(drifting.exact_v @ untouched_v / (untouched_v @ untouched_v)) > 0.002
 
 
 @pytest.mark.parametrize(

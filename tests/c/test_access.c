@@ -96,7 +96,7 @@ TEST(examined_frames_leave_no_trace)
     /* all is unknown: said, and the next frame is as ever */
     for (int i = 0; i < SMALL_ROWS; ++i)
         frame[i] = R(NAN);
-    CHECK_EQUAL(eits_examine(ctx[1], frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_examine(ctx[1], frame, SMALL_ROWS), EITS_E_FRAME_ROWS);
     for (int k = 0; k < 2; ++k)
         reconstruct(ctx[k], 9, 0, image[k]);
     CHECK(memcmp(image[0], image[1], sizeof image[0]) == 0);
@@ -119,7 +119,7 @@ TEST(a_refused_frame_leaves_no_basis)
     make_frame(ctx[0], 8, 2, frame);
     frame[fold.first] *= R(3);
     const eits_status status = eits_reconstruct(ctx[0], frame, SMALL_ROWS, NULL, NULL);
-    CHECK(status == EITS_OK || status == EITS_E_FRAME_CHANNELS);
+    CHECK(status == EITS_OK || status == EITS_E_FRAME_ROWS);
     for (int k = 0; k < 2; ++k)
         reconstruct(ctx[k], 8, 2, image[k]);
     CHECK(memcmp(image[0], image[1], sizeof image[0]) == 0);

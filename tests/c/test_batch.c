@@ -44,7 +44,7 @@ TEST(each_as_if_alone)
         const eits_status status =
             eits_reconstruct(other, alone.frames[k], SMALL_ROWS, image, NULL);
         CHECK_EQUAL(results[k].status, status);
-        CHECK_EQUAL(status, k == REFUSED ? EITS_E_FRAME_CHANNELS : EITS_OK);
+        CHECK_EQUAL(status, k == REFUSED ? EITS_E_FRAME_ROWS : EITS_OK);
         uint32_t count = 0;
         if (status == EITS_OK)
             CHECK_OK(eits_find_touches(other, found, EITS_MAX_TOUCHES, &count));

@@ -104,7 +104,7 @@ static void exercise(eits_context *ctx, uint64_t *state)
                            ? R(NAN)
                            : reference[i] * (eits_real)(1 + 0.2 * small_random(state));
         const eits_status status = eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL);
-        CHECK(status == EITS_OK || status == EITS_E_FRAME_CHANNELS);
+        CHECK(status == EITS_OK || status == EITS_E_FRAME_ROWS);
         CHECK_OK(eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count));
     }
 }
@@ -373,7 +373,7 @@ TEST(self_test_sums)
     static const struct {
         int word;
         uint32_t add, size;
-        eits_status opened, told;
+        eits_status opened, tested;
     } cases[] = {
         {1, 0, sizeof words, EITS_OK, EITS_OK},
         {1, 1, sizeof words, EITS_OK, BOTH_WIDTHS(EITS_E_ARITHMETIC, EITS_OK)},
@@ -391,7 +391,7 @@ TEST(self_test_sums)
         CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), cases[k].opened);
         if (cases[k].opened == EITS_OK) {
             small_context_open(&c, &made, (int)k % 2);
-            CHECK_EQUAL(eits_self_test(c.ctx, &difference), cases[k].told);
+            CHECK_EQUAL(eits_self_test(c.ctx, &difference), cases[k].tested);
             CHECK_NEAR(difference, 0, BOTH_WIDTHS(0, 1e-6));
             CHECK_NEAR(c.ctx->reference.v0[3], c.model.golden.reference[3], 0);
             CHECK(c.ctx->options.iterations == model.defaults->iterations);

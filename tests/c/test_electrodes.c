@@ -83,7 +83,7 @@ TEST(all_dead_is_a_dead_front_end)
     CHECK_EQUAL(ctx->info.diagnostics, 0);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = R(NAN);
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ROWS);
     CHECK_EQUAL(ctx->info.diagnostics, 0);
 }
 
@@ -149,7 +149,7 @@ TEST(refused_by_name)
     CHANGE_OPTIONS(ctx, o.max_masked = 10);
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         b.frame[i] = row_uses(ctx, i, 3) ? 0 : b.frame[i];
-    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ROWS);
     CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_ELECTRODE_OPEN);
     CHECK_EQUAL(ctx->info.open_electrodes, 1u << 3);
 }

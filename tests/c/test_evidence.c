@@ -273,7 +273,7 @@ TEST(what_model_errors_could_have_made_goes)
     }
 }
 
-/* With the columns of discs at hand those of their shapes alone are made, to the same bits. */
+/* With the columns of discs available, those of their shapes alone are made, to the same bits. */
 TEST(columns_of_discs_serve_for_their_shapes)
 {
     static const eits_disc discs[] = {ONE, OTHER};

@@ -65,15 +65,15 @@ TEST(places_get_factor_floor_distance_and_what_the_test_would_move)
 /* What the correction of places leaves stands in the distance's place, but where there is none. */
 TEST(places_widen_by_what_their_correction_leaves)
 {
-    eits_model told = *ctx->model;
+    eits_model copy = *ctx->model;
     const eits_model *before = ctx->model;
-    told.uncertainty.move_terms = 1;
-    ctx->model = &told;
+    copy.uncertainty.move_terms = 1;
+    ctx->model = &copy;
     ctx->reference.row_gains = 1;
     ctx->reference.place_trust = R(0.75);
     ctx->reference.distance = R(0.25);
     ctx->reference.place_mm2 = 2;
-    const double pixel = (double)told.pixel_mm, floor = pixel * pixel * (double)EITS_PLACE_MIN,
+    const double pixel = (double)copy.pixel_mm, floor = pixel * pixel * (double)EITS_PLACE_MIN,
                  own = (double)EITS_PLACE_FACTOR * (double)PLACE[0] + floor;
     CHECK_NEAR(rated(100, 1, PLACE, 0, 0).place_mm2[0][0],
                own + 0.75 * 2 * (double)EITS_PLACE_GEOMETRY +
@@ -193,7 +193,7 @@ TEST(two_lie_on_the_line_of_the_bulge)
     CHECK(line[0] == 0 && line[1] == 0);
 }
 
-/* An axis at some angle, told by its dipole's evidence: its direction, and its length by hand; an
+/* An axis at some angle, found by its dipole's evidence: its direction, and its length by hand; an
  * insulating touch lies across. */
 TEST(an_ellipse_lies_along_its_dipole)
 {

@@ -19,7 +19,7 @@ typedef struct bench {
     size_t size;
     void *aligned;
     eits_fast *fast;
-    eits_real quiet[SMALL_ROWS], frame[SMALL_ROWS];
+    eits_real untouched[SMALL_ROWS], frame[SMALL_ROWS];
     double sigma, gain_drift; /* V; of all voltages */
     uint32_t now_us, next;
     uint64_t random;
@@ -30,15 +30,16 @@ typedef struct bench {
 static void tare(bench *b, eits_sign sign)
 {
     CHANGE_OPTIONS(b->skin.ctx, o.sign = sign);
-    small_reference(&b->skin.model, 1.0, b->quiet);
+    small_reference(&b->skin.model, 1.0, b->untouched);
     double square = 0;
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-        square += (double)b->quiet[i] * (double)b->quiet[i];
+        square += (double)b->untouched[i] * (double)b->untouched[i];
     b->sigma = NOISE * sqrt(square / SMALL_ROWS);
     eits_real frames[16][SMALL_ROWS];
     for (uint32_t i = 0; i < 16 * SMALL_ROWS; ++i)
         frames[i / SMALL_ROWS][i % SMALL_ROWS] =
-            (eits_real)((double)b->quiet[i % SMALL_ROWS] + b->sigma * 2 * small_random(&b->random));
+            (eits_real)((double)b->untouched[i % SMALL_ROWS] +
+                        b->sigma * 2 * small_random(&b->random));
     LEARN(b->skin.ctx, 16, frames);
     memcpy(b->frame, frames[15], sizeof b->frame);
 }
@@ -118,7 +119,7 @@ static void measure(bench *b)
     uint32_t count = 0;
     const uint16_t *rows = eits_fast_rows(b->fast, b->next, &count);
     for (uint32_t i = 0; i < count; ++i) {
-        double v = (double)b->quiet[rows[i]] * (1 + b->gain_drift);
+        double v = (double)b->untouched[rows[i]] * (1 + b->gain_drift);
         for (uint32_t k = 0; k < b->fingers; ++k)
             v += answer(b, rows[i], b->on[k]);
         b->frame[rows[i]] = (eits_real)(v + b->sigma * 2 * small_random(&b->random));
@@ -151,7 +152,7 @@ static void drives(bench *b, uint32_t count)
     }
 }
 
-static uint32_t told(const bench *b, eits_fast_touch *touches)
+static uint32_t reported(const bench *b, eits_fast_touch *touches)
 {
     uint32_t count = 99;
     CHECK_OK(eits_fast_touches(b->fast, touches, EITS_FAST_TOUCHES, &count));
@@ -162,11 +163,11 @@ static uint32_t told(const bench *b, eits_fast_touch *touches)
     return count;
 }
 
-/* Each finger is told of once, within `near_mm`, and nothing else. */
-static void check_told(const bench *b, double near_mm)
+/* Each finger is reported once, within `near_mm`, and nothing else. */
+static void check_reported(const bench *b, double near_mm)
 {
     eits_fast_touch touches[EITS_FAST_TOUCHES];
-    const uint32_t count = told(b, touches);
+    const uint32_t count = reported(b, touches);
     CHECK_EQUAL(count, b->fingers);
     for (uint32_t n = 0; n < b->fingers; ++n) {
         double least = 1e9;
@@ -228,7 +229,7 @@ TEST(test_nothing_touches)
         CHECK(memcmp(aligned, b->frame, sizeof aligned) == 0);
         confirm(b, NULL, 0);
     }
-    check_told(b, 0);
+    check_reported(b, 0);
 }
 
 static void follow_a_finger(eits_sign sign)
@@ -241,8 +242,8 @@ static void follow_a_finger(eits_sign sign)
     drives(b, 16);
     put(b, 0, 20, 11, way);
     drives(b, 6);
-    check_told(b, 1.0);
-    (void)told(b, touch);
+    check_reported(b, 1.0);
+    (void)reported(b, touch);
     const uint32_t id = touch[0].id;
     CHECK(id == 1 && !touch[0].confirmed && (double)touch[0].strength_s_per_m_mm2 * way > 0);
     /* rows that were measured before it came are made as if it had been there */
@@ -252,27 +253,27 @@ static void follow_a_finger(eits_sign sign)
     CHECK(align(b, aligned) & EITS_FAST_TRUSTED);
     confirm(b, (const double[][2]){{21, 10}}, 1);
     drives(b, 24);
-    (void)told(b, touch);
+    (void)reported(b, touch);
     CHECK_EQUAL(touch[0].confirmed, 1);
-    check_told(b, 0.2);
+    check_reported(b, 0.2);
     CHECK_EQUAL(align(b, aligned), EITS_FAST_EXPLAINED | EITS_FAST_TRUSTED);
     CHECK(memcmp(aligned, b->frame, sizeof aligned) == 0);
     for (uint32_t k = 0; k < 60; ++k) { /* 300 mm/s */
         b->on[0].x_mm -= 0.39;
         drives(b, 1);
     }
-    check_told(b, 1.5);
-    (void)told(b, touch);
+    check_reported(b, 1.5);
+    (void)reported(b, touch);
     CHECK_EQUAL(touch[0].id, id);
     CHECK_NEAR(touch[0].vx_mm_per_s, -300, 60);
     CHECK(align(b, aligned) & EITS_FAST_TRUSTED);
     CHECK(memcmp(aligned, b->frame, sizeof aligned) != 0);
     b->fingers = 0;
     drives(b, 4);
-    CHECK_EQUAL(told(b, touch), 0);
+    CHECK_EQUAL(reported(b, touch), 0);
     put(b, 0, b->on[0].x_mm, b->on[0].y_mm, way); /* on again before it is forgotten */
     drives(b, 6);
-    check_told(b, 1.0);
+    check_reported(b, 1.0);
     CHECK_EQUAL(b->fast->count, 1);
     b->fingers = 0;
     drives(b, EITS_FAST_GONE + 12);
@@ -299,8 +300,8 @@ TEST(test_any_unit_of_strength)
         put(b, 0, 22, 38, 2);
         put(b, 1, -40, -24, 3);
         drives(b, 24);
-        check_told(b, 1.0);
-        (void)told(b, touch[k]);
+        check_reported(b, 1.0);
+        (void)reported(b, touch[k]);
     }
     for (uint32_t n = 0; n < 2; ++n) {
         CHECK(touch[0][n].x_mm == touch[1][n].x_mm && touch[0][n].y_mm == touch[1][n].y_mm);
@@ -324,7 +325,7 @@ TEST(test_two_at_once)
         }
         drives(b, 17);
         if (known == 2)
-            check_told(b, 1.0);
+            check_reported(b, 1.0);
         else
             CHECK(b->fast->count == 1 && b->fast->known[0].id == 9);
         b->fingers = 0; /* after a search for two */
@@ -343,12 +344,12 @@ TEST(test_several_fingers)
         put(b, n, places[n][0], places[n][1], 1);
     for (b->fingers = 1; b->fingers <= 2; ++b->fingers) {
         drives(b, 24);
-        check_told(b, 1.0);
+        check_reported(b, 1.0);
     }
     b->fingers = 5; /* five rows a drive are too few for three: frames tell of the others */
     confirm_twice(b, places, 5);
     drives(b, 40);
-    check_told(b, 1.0);
+    check_reported(b, 1.0);
     CHECK_OK(eits_fast_touches(b->fast, touches, 2, &count));
     CHECK_EQUAL(count, 2);
     put(b, 5, 0, 2, 1); /* one too many */
@@ -357,14 +358,14 @@ TEST(test_several_fingers)
     b->fingers = 5;
     confirm(b, places + 3, 2); /* frames do not show the first three */
     confirm(b, places + 3, 2);
-    CHECK_EQUAL(told(b, touches), 2);
+    CHECK_EQUAL(reported(b, touches), 2);
     memmove(b->on, b->on + 3, 2 * sizeof b->on[0]);
     b->fingers = 2;
     drives(b, 40);
-    check_told(b, 0.5);
+    check_reported(b, 0.5);
 }
 
-/* Rows that no touch changes: nothing is told, and a finger is found all the same. */
+/* Rows that no touch changes: nothing is reported, and a finger is found all the same. */
 static void spoil_glitch(bench *b)
 {
     if (b->now_us / DRIVE_US % 11 == 0)
@@ -393,7 +394,7 @@ static void spoil_open(bench *b)
     for (uint32_t i = 0; i < SMALL_ROWS; ++i) {
         const uint8_t *row = b->skin.model.protocol + 4 * i;
         if (row[2] == 3 || row[3] == 3)
-            b->frame[i] = (eits_real)(i % 2 == 0 ? 5.0 : -1.0) * b->quiet[i];
+            b->frame[i] = (eits_real)(i % 2 == 0 ? 5.0 : -1.0) * b->untouched[i];
     }
     if (b->next == 0 && b->fast->wild > 0) {
         confirm(b, (const double[][2]){{-40, 0}}, 1);
@@ -414,21 +415,21 @@ TEST(test_other_things_than_touches)
         bench *b = bench_open(EITS_SIGN_INCREASE);
         for (uint32_t k = 0; k < 264; ++k) {
             if (k == 200) {
-                check_told(b, 0);
+                check_reported(b, 0);
                 put(b, 0, 12, -20, 1);
             }
             measure(b);
             spoils[how](b);
             give(b);
         }
-        check_told(b, 1.0);
+        check_reported(b, 1.0);
         CHECK_EQUAL(b->fast->suspect[3] > EITS_FAST_SUSPECT,
                     spoils[how] == spoil_open || spoils[how] == spoil_dead);
     }
 }
 
 /* Rows that are missing are not rows that a finger leaves as they were: wherever it lands, it is
- * told of after a few drives. */
+ * reported after a few drives. */
 TEST(test_fingers_beside_missing_rows)
 {
     for (uint32_t place = 0; place < 16; ++place) {
@@ -444,23 +445,24 @@ TEST(test_fingers_beside_missing_rows)
             }
             give(b);
         }
-        check_told(b, 2.0);
+        check_reported(b, 2.0);
     }
 }
 
-/* Noise that no touch explains: little is told, none for long, and nothing breaks. */
+/* Noise that no touch explains: little is reported, none for long, and nothing breaks. */
 TEST(test_rows_without_sense)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
     eits_fast_touch touches[EITS_FAST_TOUCHES];
-    uint32_t drives_told = 0;
+    uint32_t drives_reported = 0;
     for (uint32_t k = 0; k < 400; ++k) {
         for (uint32_t i = 0; i < SMALL_ROWS; ++i)
-            b->frame[i] = (eits_real)((double)b->quiet[i] * (1 + 1e-2 * small_random(&b->random)));
+            b->frame[i] =
+                (eits_real)((double)b->untouched[i] * (1 + 1e-2 * small_random(&b->random)));
         give(b);
-        drives_told += told(b, touches) > 0;
+        drives_reported += reported(b, touches) > 0;
     }
-    CHECK(drives_told < 20);
+    CHECK(drives_reported < 20);
     CHECK_EQUAL(align(b, b->frame), EITS_FAST_TRUSTED * 0);
     CHECK_EQUAL(align(b, b->frame), EITS_FAST_TRUSTED);
 }
@@ -472,24 +474,24 @@ TEST(test_frames_begin_and_end_touches)
     bench *b = bench_open(EITS_SIGN_INCREASE);
     eits_fast_touch touches[EITS_FAST_TOUCHES];
     confirm(b, far, 1);
-    CHECK_EQUAL(told(b, touches), 0); /* one frame is not enough */
+    CHECK_EQUAL(reported(b, touches), 0); /* one frame is not enough */
     confirm(b, far, 1);
-    CHECK_EQUAL(told(b, touches), 1);
+    CHECK_EQUAL(reported(b, touches), 1);
     CHECK_EQUAL(touches[0].confirmed, 1);
     CHECK_NEAR(touches[0].x_mm, -40, 1e-4);
     confirm(b, (const double[][2]){{-40, 4}, {-40, -4}}, 2); /* one of them is beside it */
     confirm(b, (const double[][2]){{-40, 4}, {-40, -4}}, 2);
-    CHECK_EQUAL(told(b, touches), 1);
+    CHECK_EQUAL(reported(b, touches), 1);
     confirm(b, far, 7); /* more than there is room for */
     confirm(b, far, 7);
-    CHECK_EQUAL(told(b, touches), EITS_FAST_TOUCHES);
+    CHECK_EQUAL(reported(b, touches), EITS_FAST_TOUCHES);
     confirm(b, far, 0);
-    CHECK_EQUAL(told(b, touches), EITS_FAST_TOUCHES); /* one frame does not end them */
+    CHECK_EQUAL(reported(b, touches), EITS_FAST_TOUCHES); /* one frame does not end them */
     confirm(b, far, 0);
-    CHECK_EQUAL(told(b, touches), 0);
+    CHECK_EQUAL(reported(b, touches), 0);
     confirm_twice(b, far, 1);
     drives(b, 24); /* rows do not bear it out */
-    CHECK_EQUAL(told(b, touches), 0);
+    CHECK_EQUAL(reported(b, touches), 0);
 }
 
 /* Drives come while a frame is solved: what is found in it is where touches were then, and says
@@ -505,7 +507,7 @@ TEST(test_touches_that_move_on)
         drives(b, 1);
     }
     find(b, (const double[][2]){{20, 11}}, 1);
-    CHECK_EQUAL(told(b, touch), 1);
+    CHECK_EQUAL(reported(b, touch), 1);
     CHECK_NEAR(touch[0].x_mm, 0, 2.0);
     CHECK_EQUAL(touch[0].confirmed, 1);
     CHECK_EQUAL(b->fast->seeds, 0);
@@ -530,7 +532,7 @@ TEST(test_named_electrodes)
                 b->frame[i] += (eits_real)(300 * b->sigma * small_random(&b->random));
         }
         give(b);
-        check_told(b, 0);
+        check_reported(b, 0);
         CHECK_EQUAL(b->fast->unexplained, 0);
     }
     states[3] = 0;
@@ -614,7 +616,7 @@ TEST(test_a_gain_that_drifts)
         CHECK_EQUAL(named(b, 0), 0);
         settle(b, 8);
         CHECK_EQUAL(named(b, 0), k == 0 ? 0 : STALE);
-        check_told(b, 0);
+        check_reported(b, 0);
         b->gain_drift = 0;
         settle(b, 160);
         CHECK_EQUAL(named(b, 0), 0);
@@ -647,10 +649,10 @@ TEST(test_a_clock_that_stands_or_goes_back)
         drives(b, 1);
     }
     CHECK(b->fast->p[0][0] < sure);
-    check_told(b, 0.5);
+    check_reported(b, 0.5);
     b->now_us += 60000000; /* a minute: the touch may be anywhere, and is found again */
     drives(b, 24);
-    check_told(b, 1.0);
+    check_reported(b, 1.0);
 }
 
 TEST(test_a_touch_that_leaves_the_skin)
@@ -658,17 +660,17 @@ TEST(test_a_touch_that_leaves_the_skin)
     bench *b = bench_open(EITS_SIGN_INCREASE);
     put(b, 0, 40, 0, 1);
     drives(b, 16);
-    check_told(b, 0.5);
+    check_reported(b, 0.5);
     b->fast->state[FAST_X] = 500;
     drives(b, 1);
     CHECK_EQUAL(b->fast->count, 0);
     drives(b, 16);
-    check_told(b, 0.5);
+    check_reported(b, 0.5);
     b->fast->state[FAST_VX] = (eits_real)NAN;
     drives(b, 1);
     CHECK_EQUAL(b->fast->count, 0);
     drives(b, 16);
-    check_told(b, 0.5);
+    check_reported(b, 0.5);
     b->fast->next_id = UINT32_MAX; /* numbers begin again at 1 */
     put(b, 1, -30, 20, 1);
     drives(b, 16);
@@ -690,7 +692,7 @@ TEST(test_places_that_the_reference_corrects)
         drives(b, 40);
         put(b, 0, 12, -20, 1);
         drives(b, 40);
-        CHECK_EQUAL(told(b, touches), 1);
+        CHECK_EQUAL(reported(b, touches), 1);
         CHECK_NEAR(touches[0].x_mm, 12 + x, 1);
         CHECK_NEAR(touches[0].y_mm, -21, 1);
         for (uint32_t k = 0; k < EITS_FAST_LOST_FRAMES; ++k)
@@ -774,7 +776,7 @@ TEST(test_what_is_refused)
     CHECK_REFUSED(eits_fast_name(NULL, &info));
     CHECK_REFUSED(eits_fast_name(b->fast, NULL));
     CHECK_REFUSED(eits_fast_begin(NULL));
-    CHECK_OK(eits_reference_set(b->skin.ctx, b->quiet, SMALL_ROWS));
+    CHECK_OK(eits_reference_set(b->skin.ctx, b->untouched, SMALL_ROWS));
     CHECK_EQUAL(eits_fast_begin(b->fast), EITS_E_NO_REFERENCE); /* of unknown noise */
     CHECK_OK(eits_reference_begin(b->skin.ctx, 4));
     CHECK_EQUAL(eits_fast_begin(b->fast), EITS_E_NO_REFERENCE); /* not yet */

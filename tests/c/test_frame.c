@@ -176,7 +176,7 @@ static void check_unusable(eits_data_kind kind, int project)
     CHECK_EQUAL(ctx->projection.count, project);
 }
 
-TEST(unusable_channels)
+TEST(unusable_rows)
 {
     EACH_ROW(row, KINDS) {
         check_unusable(row->kind, 0);
@@ -274,7 +274,7 @@ TEST(refused_frames_clear_the_image)
         eits_status expected;
         uint32_t masked;
     } refused[] = {
-        {"more missing than may be", 4, NAN, 0, SMALL_ROWS, EITS_E_FRAME_CHANNELS, 4},
+        {"more missing than may be", 4, NAN, 0, SMALL_ROWS, EITS_E_FRAME_ROWS, 4},
         {"no rows", 0, 0, 0, 0, EITS_E_FRAME_LENGTH, 0},
         {"a row too few", 0, 0, 0, SMALL_ROWS - 1, EITS_E_FRAME_LENGTH, 0},
         {"a row too many", 0, 0, 0, SMALL_ROWS + 1, EITS_E_FRAME_LENGTH, 0},

@@ -9,11 +9,11 @@
 
 enum { FRAME_US = 20833, ROOM = EITS_MAX_EVENTS, KEPT = 4096 };
 
-/* A stream of frames at 48 a second, and all that was told of it but moves. */
+/* A stream of frames at 48 a second, and all that was reported of it but moves. */
 typedef struct bench {
     eits_gestures g;
     uint32_t now_us, count, moves;
-    eits_event told[KEPT];
+    eits_event reported[KEPT];
 } bench;
 
 static bench b;
@@ -32,17 +32,17 @@ static void keep(const eits_event *events, uint32_t count)
               isfinite((double)events[k].direction_deg) && isfinite((double)events[k].value));
         b.moves += events[k].kind == EITS_EVENT_MOVE;
         if (events[k].kind != EITS_EVENT_MOVE && b.count < KEPT)
-            b.told[b.count++] = events[k];
+            b.reported[b.count++] = events[k];
     }
 }
 
 static void frame(const eits_touch *touches, uint32_t count)
 {
     eits_event events[ROOM];
-    uint32_t told = 99;
-    CHECK_OK(eits_gestures_update(&b.g, touches, count, b.now_us, events, ROOM, &told));
+    uint32_t reported = 99;
+    CHECK_OK(eits_gestures_update(&b.g, touches, count, b.now_us, events, ROOM, &reported));
     b.now_us += FRAME_US;
-    keep(events, told);
+    keep(events, reported);
 }
 
 static eits_touch touch(uint32_t id, double x, double y)
@@ -80,16 +80,16 @@ static void fingers(const double from[4], const double by[4], int frames)
     }
 }
 
-/* How often a kind was told, in a phase. */
+/* How often a kind was reported, in a phase. */
 static int count_of(eits_event_kind kind, eits_event_phase phase)
 {
     int count = 0;
     for (uint32_t k = 0; k < b.count; ++k)
-        count += b.told[k].kind == (uint32_t)kind && b.told[k].phase == (uint32_t)phase;
+        count += b.reported[k].kind == (uint32_t)kind && b.reported[k].phase == (uint32_t)phase;
     return count;
 }
 
-/* All that was told, moves and changes left out: "2 down, up, pinch begins". */
+/* All that was reported, moves and changes left out: "2 down, up, pinch begins". */
 static const char *story(void)
 {
     static const char *const kinds[] = {
@@ -120,33 +120,33 @@ static void check_story(const char *expected, const char *file, int line)
 {
     const char *got = story();
     if (check_counts(strcmp(got, expected) == 0, file, line))
-        printf(": told \"%s\", expected \"%s\"\n", got, expected);
+        printf(": reported \"%s\", expected \"%s\"\n", got, expected);
 }
 /* So far; and once the fingers have gone for a while. */
-#define TOLD(expected) check_story(expected, __FILE__, __LINE__)
-#define ENDS(expected) (none(3), check_story(expected, __FILE__, __LINE__))
+#define REPORTS(expected) check_story(expected, __FILE__, __LINE__)
+#define ENDS(expected)    (none(3), check_story(expected, __FILE__, __LINE__))
 
 static const eits_event *last(eits_event_kind kind)
 {
     static const eits_event nothing;
     for (uint32_t k = b.count; k-- > 0;) {
-        if (b.told[k].kind == (uint32_t)kind)
-            return &b.told[k];
+        if (b.reported[k].kind == (uint32_t)kind)
+            return &b.reported[k];
     }
     return &nothing;
 }
 
 /* ---- one finger ---- */
 
-TEST(a_tap_is_told_in_the_first_frame_without_it)
+TEST(a_tap_is_reported_in_the_first_frame_without_it)
 {
     begin();
     none(2);
     finger(7, 10, -20, 0, 0, 5);
-    TOLD("down");
-    CHECK_EQUAL(b.told[0].time_us, 0xFFFF0000u + 3 * FRAME_US); /* once it has lasted a frame */
+    REPORTS("down");
+    CHECK_EQUAL(b.reported[0].time_us, 0xFFFF0000u + 3 * FRAME_US); /* once it has lasted a frame */
     none(1);
-    TOLD("down, up, tap");
+    REPORTS("down, up, tap");
     CHECK_EQUAL(last(EITS_EVENT_TAP)->first_id, 7);
     CHECK_NEAR(last(EITS_EVENT_TAP)->x_mm, 10, 1e-6);
     CHECK_NEAR(last(EITS_EVENT_TAP)->y_mm, -20, 1e-6);
@@ -162,7 +162,7 @@ TEST(two_taps_soon_and_near_are_a_double_tap_and_a_third_is_a_first)
         finger(k, 10 + k, 0, 0, 0, 4);
         none(6);
     }
-    TOLD("3 down, 3 up, 2 tap, double tap");
+    REPORTS("3 down, 3 up, 2 tap, double tap");
     CHECK_EQUAL(last(EITS_EVENT_DOUBLE_TAP)->first_id, 2);
     begin();
     finger(1, 0, 0, 0, 0, 4);
@@ -177,9 +177,9 @@ TEST(a_long_press_is_a_hold_once_and_no_tap)
 {
     begin();
     finger(1, 5, 5, 0, 0, 24);
-    TOLD("down");
+    REPORTS("down");
     finger(1, 5, 5, 0, 0, 2); /* the 25th frame is 0.5 s after the first */
-    TOLD("down, hold");
+    REPORTS("down, hold");
     CHECK_NEAR(last(EITS_EVENT_HOLD)->value, 0.5, 0.03);
     finger(1, 5, 5, 0, 0, 30);
     ENDS("down, up, hold");
@@ -230,10 +230,10 @@ TEST(two_fingers_pinch_and_the_end_says_by_how_much)
 {
     begin();
     pair(50, 2, 20);
-    TOLD("2 down, pinch begins");
+    REPORTS("2 down, pinch begins");
     CHECK(count_of(EITS_EVENT_PINCH, EITS_PHASE_CHANGE) > 5);
     none(1);
-    TOLD("2 down, 2 up, pinch begins, pinch ends");
+    REPORTS("2 down, 2 up, pinch begins, pinch ends");
     ENDS("2 down, 2 up, pinch begins, pinch ends");
     const eits_event *end = last(EITS_EVENT_PINCH);
     CHECK_EQUAL(end->first_id, 1);
@@ -276,8 +276,8 @@ TEST(two_fingers_turn_either_way)
     }
 }
 
-/* A change is told for each so much of way, not for each frame: 0.6 mm here, of 72. */
-TEST(a_slow_turn_is_told_by_its_way)
+/* A change is reported for each so much of way, not for each frame: 0.6 mm here, of 72. */
+TEST(a_slow_turn_is_reported_by_its_way)
 {
     turn(0.01, 120);
     CHECK(count_of(EITS_EVENT_ROTATE, EITS_PHASE_CHANGE) > 8);
@@ -332,7 +332,7 @@ TEST(a_scan_that_a_finger_lifts_in_does_not_move_it)
     finger(1, 40, 59, 0, 0, 6);
     frame(&going, 1);
     frame(&held, 1); /* it has lifted */
-    TOLD("down, up, tap");
+    REPORTS("down, up, tap");
     ENDS("down, up, tap");
 }
 
@@ -354,17 +354,17 @@ TEST(a_held_touch_and_a_lost_frame_do_not_end_a_hold)
     begin();
     finger(1, 5, 5, 0, 0, 8);
     frame(&held, 1);
-    TOLD("down");
+    REPORTS("down");
     CHECK_EQUAL(b.moves, 0); /* where the tracker holds it says nothing of where it is */
     finger(1, 5, 5, 0, 0, 7);
-    none(1); /* more than a tap was: nothing is told of the false lift but up */
+    none(1); /* more than a tap was: nothing is reported of the false lift but up */
     finger(1, 5, 5, 0, 0, 12);
-    TOLD("2 down, up, hold");
-    CHECK_EQUAL(b.told[b.count - 1].first_id, 1);
+    REPORTS("2 down, up, hold");
+    CHECK_EQUAL(b.reported[b.count - 1].first_id, 1);
     ENDS("2 down, 2 up, hold");
 }
 
-TEST(a_tap_that_is_found_again_is_told_once)
+TEST(a_tap_that_is_found_again_is_reported_once)
 {
     begin();
     finger(1, 5, 5, 0, 0, 4);
@@ -406,7 +406,7 @@ TEST(half_of_a_touch_is_no_finger_until_it_has_lasted)
     frame(split, 2);
     frame(split, 2);
     finger(1, 0, 0, 0, 0, 2);
-    TOLD("down");
+    REPORTS("down");
     ENDS("down, up, tap");
     begin();
     finger(1, 0, 0, 0, 0, 6);
@@ -415,7 +415,7 @@ TEST(half_of_a_touch_is_no_finger_until_it_has_lasted)
     for (int k = 0; k < 4; ++k) {
         frame(two, 2);
         if (k % 2)
-            TOLD(k == 1 ? "down" : "2 down");
+            REPORTS(k == 1 ? "down" : "2 down");
     }
     ENDS("2 down, 2 up");
 }
@@ -426,7 +426,7 @@ TEST(a_landing_that_is_renamed_holds_where_it_rests)
     const eits_touch both[] = {touch(1, 14, 62), touch(2, 12, 44)};
     static const struct {
         double still_mm, dx; /* how still it is counts from there on; 0: as usual */
-        const char *told;
+        const char *reported;
     } cases[] = {{0, 0, "down, hold"}, {0.5, 0, "down, hold"}, {0.5, 0.1, "down"}};
     for (size_t k = 0; IN_TABLE(k, cases); ++k) {
         begin();
@@ -435,7 +435,7 @@ TEST(a_landing_that_is_renamed_holds_where_it_rests)
         finger(1, 20, 57, 0, 0, 1);
         frame(both, 2);
         finger(2, 11, 51, cases[k].dx, 0, 30);
-        TOLD(cases[k].told);
+        REPORTS(cases[k].reported);
         if (k == 0)
             CHECK_NEAR(last(EITS_EVENT_HOLD)->x_mm, 11, 1e-6);
     }
@@ -501,18 +501,18 @@ static void crowd(uint32_t round)
 TEST(events_without_room_are_counted)
 {
     eits_event few[2];
-    uint32_t told;
+    uint32_t reported;
     eits_touch many[EITS_MAX_TOUCHES];
     begin();
     for (uint32_t k = 0; k < EITS_MAX_TOUCHES; ++k)
         many[k] = touch(k + 1, 60.0 * (k % 4), 60.0 * (k / 4));
     frame(many, EITS_MAX_TOUCHES);
-    CHECK_OK(eits_gestures_update(&b.g, many, EITS_MAX_TOUCHES, b.now_us, few, 2, &told));
-    CHECK_EQUAL(told, 2);
+    CHECK_OK(eits_gestures_update(&b.g, many, EITS_MAX_TOUCHES, b.now_us, few, 2, &reported));
+    CHECK_EQUAL(reported, 2);
     CHECK_EQUAL(few[1].kind, EITS_EVENT_DOWN);
     CHECK_EQUAL(b.g.dropped, EITS_MAX_TOUCHES - 2);
-    CHECK_OK(eits_gestures_update(&b.g, NULL, 0, b.now_us + FRAME_US, NULL, 0, &told));
-    CHECK_EQUAL(told, 0);
+    CHECK_OK(eits_gestures_update(&b.g, NULL, 0, b.now_us + FRAME_US, NULL, 0, &reported));
+    CHECK_EQUAL(reported, 0);
     CHECK_EQUAL(b.g.dropped, 2 * EITS_MAX_TOUCHES - 2);
 }
 
@@ -573,32 +573,32 @@ TEST(time_that_stands_goes_back_or_leaps)
     CHECK_EQUAL(b.moves, 0);
     b.now_us -= 100 * FRAME_US;
     none(1);
-    TOLD("down, up");
+    REPORTS("down, up");
     pair(50, 2, 20);
     b.now_us += 2000000;
     none(1);
-    TOLD("3 down, 3 up, pinch begins, pinch ends"); /* the pinch had begun */
+    REPORTS("3 down, 3 up, pinch begins, pinch ends"); /* the pinch had begun */
 }
 
 TEST(wrong_arguments_are_refused)
 {
     eits_event events[1];
     eits_gesture_options options;
-    uint32_t told;
+    uint32_t reported;
     const eits_touch t = touch(1, 0, 0);
     begin();
-    CHECK_REFUSED(eits_gestures_usual(NULL));
+    CHECK_REFUSED(eits_gestures_default(NULL));
     CHECK_REFUSED(eits_gestures_init(NULL, NULL));
-    CHECK_OK(eits_gestures_usual(&options));
+    CHECK_OK(eits_gestures_default(&options));
     CHECK_OK(eits_gestures_init(&b.g, &options));
     options.split_mm = (eits_real)NAN;
     CHECK_REFUSED(eits_gestures_init(&b.g, &options));
     options.split_mm = -1;
     CHECK_REFUSED(eits_gestures_init(&b.g, &options));
-    CHECK_REFUSED(eits_gestures_update(NULL, &t, 1, 0, events, 1, &told));
-    CHECK_REFUSED(eits_gestures_update(&b.g, NULL, 1, 0, events, 1, &told));
-    CHECK_REFUSED(eits_gestures_update(&b.g, &t, EITS_MAX_TOUCHES + 1, 0, events, 1, &told));
-    CHECK_REFUSED(eits_gestures_update(&b.g, &t, 1, 0, NULL, 1, &told));
+    CHECK_REFUSED(eits_gestures_update(NULL, &t, 1, 0, events, 1, &reported));
+    CHECK_REFUSED(eits_gestures_update(&b.g, NULL, 1, 0, events, 1, &reported));
+    CHECK_REFUSED(eits_gestures_update(&b.g, &t, EITS_MAX_TOUCHES + 1, 0, events, 1, &reported));
+    CHECK_REFUSED(eits_gestures_update(&b.g, &t, 1, 0, NULL, 1, &reported));
     CHECK_REFUSED(eits_gestures_update(&b.g, &t, 1, 0, events, 1, NULL));
 }
 

@@ -189,7 +189,7 @@ TEST(one_outlier_of_a_half_scan)
         CHECK(ctx->info.model_mismatch == 0 && ctx->rows.unusable[fold.first] == EITS_ROW_OUTLIER);
         memcpy(data, ctx->frame.y, sizeof data);
         look_for(ctx, EITS_DIAGNOSTICS_ALL, rows - 1);
-        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_CHANNELS);
+        CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_E_FRAME_ROWS);
         CHECK_EQUAL(ctx->info.diagnostics, EITS_DIAGNOSTIC_OUTLIER);
         CHECK_EQUAL(ctx->info.outliers, rows);
         look_for(ctx, EITS_DIAGNOSTICS_ALL & ~(uint32_t)EITS_DIAGNOSTIC_OUTLIER, SMALL_ROWS);

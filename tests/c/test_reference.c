@@ -92,7 +92,7 @@ TEST(refused_frames)
     for (int i = 0; i < SMALL_ROWS; ++i) {
         small_reference(&b.c.model, 1, b.frame);
         b.frame[i] = (eits_real)(i % 3 == 0 ? NAN : (i % 3 == 1 ? INFINITY : -INFINITY));
-        CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+        CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ROWS);
     }
     small_reference(&b.c.model, 1, b.frame);
     b.frame[7] = (eits_real)INFINITY;
@@ -104,13 +104,13 @@ TEST(refused_frames)
     CHECK_EQUAL(eits_mask_row(ctx, 7, 0), EITS_OK);
     CHANGE_OPTIONS(ctx, o.saturation_v = R(1.2));
     small_reference(&b.c.model, 1, b.frame); /* its greatest number is above 1.2 */
-    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ROWS);
     small_reference(&b.c.model, -1, b.frame);
-    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ROWS);
     small_reference(&b.c.model, 0.7, b.frame);
     CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
     b.frame[3] = R(-1.2); /* at the limit counts as beyond it */
-    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ROWS);
 }
 
 /* A reference that cannot be one leaves the old one in force, to the bit. */
@@ -175,7 +175,7 @@ TEST(order_of_learning)
         reference_frame(&b, 1, 1e-3, &state);
         const eits_real good = b.frame[5];
         b.frame[5] = (eits_real)NAN;
-        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_CHANNELS);
+        CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_E_FRAME_ROWS);
         b.frame[5] = good;
         CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS), EITS_OK);
     }
@@ -313,7 +313,7 @@ TEST(nothing_to_compare)
     for (int k = 0; k < 4; ++k) {
         reference_frame(&b, 1, 1e-3, &state);
         CHECK_EQUAL(eits_reference_add(ctx, b.frame, SMALL_ROWS),
-                    k < 2 ? EITS_OK : EITS_E_FRAME_CHANNELS);
+                    k < 2 ? EITS_OK : EITS_E_FRAME_ROWS);
     }
     CHECK_EQUAL(ctx->reference.count, 2);
     CHANGE_OPTIONS(ctx, o.max_masked = 1);

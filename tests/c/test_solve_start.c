@@ -130,7 +130,7 @@ TEST(cold_after_nothing)
         CHECK_OK(eits_reconstruct(ctx, frame, SMALL_ROWS, NULL, NULL));
         CHECK_EQUAL(eits_reconstruct(ctx, nothing, SMALL_ROWS, NULL, NULL),
                     why == 0   ? EITS_OK
-                    : why == 1 ? EITS_E_FRAME_CHANNELS
+                    : why == 1 ? EITS_E_FRAME_ROWS
                                : EITS_E_FRAME_ZERO);
         /* makes the basis */
         CHECK_EQUAL(eits_reconstruct(other, nothing, SMALL_ROWS, NULL, NULL) == EITS_OK, why == 0);

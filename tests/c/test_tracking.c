@@ -17,7 +17,7 @@ static eits_context *set_up(dense_bench *b, uint32_t confirm, uint32_t hold, dou
     return ctx;
 }
 
-/* Its own S'y is 10 sqrt(explained) times the noise's: faint from 0.009 down; above 0.05 a birth
+/* Its own S'y is 10 sqrt(explained) times the noise's: faint from 0.009 down; above 0.05 a start
  * is sure. */
 static eits_touch at(double x, double y, double explained)
 {

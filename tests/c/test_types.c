@@ -23,7 +23,7 @@ TEST(status_texts)
         {EITS_E_MODEL_VALUE, "number"},
         {EITS_E_MODEL_ALIGNMENT, "boundary"},
         {EITS_E_FRAME_LENGTH, "length"},
-        {EITS_E_FRAME_CHANNELS, "channels"},
+        {EITS_E_FRAME_ROWS, "rows"},
         {EITS_E_FRAME_ZERO, "zero"},
         {EITS_E_NO_REFERENCE, "no reference"},
         {EITS_E_REFERENCE_SHORT, "too few frames"},

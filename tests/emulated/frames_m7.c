@@ -44,7 +44,7 @@ enum { FRAME_US = 20833, ROW_US = 100 }; /* 48 frames a second */
 #define TIMER_VALUE  (*(volatile uint32_t *)0x40000004u)
 #define TIMER_RELOAD (*(volatile uint32_t *)0x40000008u)
 
-/* Anew for every count, so that none depends on where between two ticks it began. */
+/* Again for every count, so that none depends on where between two ticks it began. */
 static void start_timer(void)
 {
     TIMER_CTRL = 0;
@@ -244,10 +244,10 @@ static int solve_one(unsigned k, int reduced)
     start_timer();
     (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &found);
     const unsigned long touch = instructions_since_start();
-    uint32_t told = 0;
+    uint32_t reported = 0;
     start_timer();
     (void)eits_gestures_update(&gestures, touches, found, gestures.time_us + FRAME_US, events,
-                               EITS_MAX_EVENTS, &told);
+                               EITS_MAX_EVENTS, &reported);
     const unsigned long gesture = instructions_since_start();
     const unsigned long stack = stack_used(painted);
     printf("frame %u status %d stop %d iterations %lu macs %lu touchmacs %lu solve %lu touch %lu "
@@ -260,7 +260,7 @@ static int solve_one(unsigned k, int reduced)
     return 1;
 }
 
-/* One drive of the frame at hand. */
+/* One drive of the present frame. */
 static void play_drive(eits_fast *fast, uint32_t drive, uint32_t time_us)
 {
     eits_real volts[EITS_FAST_ROWS];

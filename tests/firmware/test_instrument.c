@@ -274,7 +274,7 @@ TEST(test_failed_tare)
     b.board.extra_turn += 0.1;
     const eits_packet_reply reply = host_reply(&b.host, tare.request);
     CHECK_EQUAL(reply.status, EITS_REPLY_CORE);
-    CHECK_EQUAL(reply.detail[0], EITS_E_FRAME_CHANNELS);
+    CHECK_EQUAL(reply.detail[0], EITS_E_FRAME_ROWS);
     CHECK(same_bits(v0, engine->ctx->reference.v0, sizeof(float) * 208));
     CHECK_EQUAL(engine->ctx->reference.ready, 1);
     CHECK(same_bits(&before.noise_v, &engine->ctx->reference.noise_v, 4));

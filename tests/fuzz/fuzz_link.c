@@ -123,7 +123,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     return 0;
 }
 
-/* ---- mutation: what lies between zeros may be decoded, changed, and encoded anew, so that
+/* ---- mutation: what lies between zeros may be decoded, changed, and encoded again, so that
  * checksums are no wall ---- */
 
 static size_t mutate_packet(uint8_t *data, size_t size, size_t room, uint32_t seed)

@@ -1,6 +1,6 @@
 /* Fingers on a skin in time: a script lays them on, moves and lifts them, loses electrodes and
  * rows; each drive goes the fast way, each frame through the solver, the test of touches and the
- * tracker, and what is told of them makes gestures and presses of zones. All numbers must be
+ * tracker, and what is reported makes gestures and presses of zones. All numbers must be
  * finite, all counts within their limits.
  *
  * Frames have the data of discs in the model's columns; drives, of the same fingers, the sum over
@@ -150,24 +150,24 @@ static double answer(uint32_t row)
 
 static void drives(void)
 {
-    eits_fast_touch told[EITS_FAST_TOUCHES];
-    eits_real quiet[SMALL_ROWS], volts[EITS_FAST_ROWS];
-    small_reference(&model, 1.0, quiet);
+    eits_fast_touch reported[EITS_FAST_TOUCHES];
+    eits_real untouched[SMALL_ROWS], volts[EITS_FAST_ROWS];
+    small_reference(&model, 1.0, untouched);
     for (uint32_t drive = 0; drive < eits_fast_drives(fast); ++drive) {
         uint32_t rows, count;
         const uint16_t *row = eits_fast_rows(fast, drive, &rows);
         MUST(row != NULL && rows <= EITS_FAST_ROWS);
         for (uint32_t i = 0; i < rows; ++i)
-            volts[i] = spoilt((double)quiet[row[i]] + answer(row[i]), row[i]);
+            volts[i] = spoilt((double)untouched[row[i]] + answer(row[i]), row[i]);
         MUST(eits_fast_drive(fast, drive, volts, rows, now_us) == EITS_OK);
         now_us += 1300;
-        MUST(eits_fast_touches(fast, told, EITS_FAST_TOUCHES, &count) == EITS_OK);
+        MUST(eits_fast_touches(fast, reported, EITS_FAST_TOUCHES, &count) == EITS_OK);
         MUST(count <= EITS_FAST_TOUCHES);
         for (uint32_t k = 0; k < count; ++k) {
-            const eits_real *numbers = &told[k].x_mm;
+            const eits_real *numbers = &reported[k].x_mm;
             for (int n = 0; n < 5; ++n)
                 MUST(eits_is_finite(numbers[n]));
-            fuzz_note("followed", &told[k].id, 2 * sizeof(uint32_t));
+            fuzz_note("followed", &reported[k].id, 2 * sizeof(uint32_t));
             fuzz_note_reals("followed", numbers, 5);
         }
         for (int k = 0; k < FINGERS; ++k) {
@@ -190,12 +190,12 @@ static void note_events(const char *name, const eits_event *events, uint32_t cou
 static void tell(const eits_touch *touches, uint32_t count)
 {
     eits_event events[EITS_MAX_EVENTS], presses[EITS_MAX_ZONE_EVENTS];
-    uint32_t told, pressed;
-    MUST(eits_gestures_update(&gestures, touches, count, now_us, events, EITS_MAX_EVENTS, &told) ==
+    uint32_t reported, pressed;
+    MUST(eits_gestures_update(&gestures, touches, count, now_us, events, EITS_MAX_EVENTS,
+                              &reported) == EITS_OK);
+    MUST(eits_zones_update(&zones, events, reported, presses, EITS_MAX_ZONE_EVENTS, &pressed) ==
          EITS_OK);
-    MUST(eits_zones_update(&zones, events, told, presses, EITS_MAX_ZONE_EVENTS, &pressed) ==
-         EITS_OK);
-    note_events("gestures", events, told);
+    note_events("gestures", events, reported);
     note_events("zones", presses, pressed);
 }
 

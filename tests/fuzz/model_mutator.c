@@ -52,7 +52,7 @@ static void seal(uint8_t *data, size_t size)
         put(data + 12, eits_crc32(0, data + 16, total - 16u));
 }
 
-/* ---- other dimensions: every section anew, filled with what the old one held, over and over ----
+/* ---- other dimensions: every section again, filled with what the old one held, over and over ----
  */
 
 static size_t sizes_for(const uint32_t d[10], uint32_t bytes[SECTIONS])

@@ -8,7 +8,7 @@ from eitskin.solve.reconstructor import ENGINES, Reconstructor
 
 
 class AllEngines(dict[str, Reconstructor]):
-    """What is asked of it is asked of each: ``all_engines.tare(quiet)`` has every reference as
+    """What is asked of it is asked of each: ``all_engines.tare(untouched)`` has every reference as
     learned, by engine."""
 
     def __init__(

@@ -57,17 +57,17 @@ class Host(CoreEngine):
     """A context that keeps on after an error and gives its status."""
 
     def status_of(self, step: Choose | TareStep) -> int:
-        """Of options or quiet frames, as the C core itself sees them."""
+        """Of options or untouched frames, as the C core itself sees them."""
         if isinstance(step, Choose):
             try:
                 self.set_options(step.options)
             except EitskinError as error:
                 return int(str(error).split("status ")[1].rstrip(")"))
             return 0
-        count, status = len(step.quiet_v), 0
+        count, status = len(step.untouched_v), 0
         if count >= 4:
             status = self._lib.eits_reference_begin(self._context, count)
-        for frame in step.quiet_v:
+        for frame in step.untouched_v:
             if status == 0:
                 self._frame[:] = frame
                 take = self._lib.eits_reference_add if count >= 4 else self._lib.eits_reference_set
@@ -112,7 +112,7 @@ def on_host(
             continue
         assert host is not None, "the first step must be a model"
         if isinstance(step, TareStep):
-            statuses.append(host.status_of(TareStep(as_float32(step.quiet_v))))
+            statuses.append(host.status_of(TareStep(as_float32(step.untouched_v))))
         elif isinstance(step, Choose):
             statuses.append(host.status_of(step))
         elif isinstance(step, Mask):
@@ -160,17 +160,17 @@ class SameEverywhere:
     def __call__(
         self,
         blob: bytes,
-        quiet_v: np.ndarray,
+        untouched_v: np.ndarray,
         frames_v: np.ndarray,
         options: Options | None = None,
         masked: np.ndarray | None = None,
     ) -> list[Outcome]:
-        """Of frames (k, m) after a tare on quiet frames (q, m), volts, which must be taken; None:
-        the model's options."""
+        """Of frames (k, m) after a tare on untouched frames (q, m), volts, which must be taken;
+        None: the model's options."""
         chosen = options or default_options(decode_model(blob, "model"))
         masks = [] if masked is None else [Mask(masked)]
         statuses, outcomes = self.steps(
-            [Load(blob), Choose(chosen), *masks, TareStep(quiet_v), Play(frames_v)]
+            [Load(blob), Choose(chosen), *masks, TareStep(untouched_v), Play(frames_v)]
         )
         assert statuses == [0, 0, 0], statuses
         return outcomes

@@ -1,4 +1,4 @@
-"""Made-up points of a trade-off, and wishes for them."""
+"""Made-up points of a trade-off, and conditions for them."""
 
 from typing import Any
 

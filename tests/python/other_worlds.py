@@ -62,7 +62,7 @@ class World:
 
 
 EIGHT = {"count": (8, 8), "radius_mm": (9.0, 9.0), "contrast": (5.0, 5.0), "spacing_radii": 4.0}
-QUIET = {"snr_db": 80.0, "adc_bits": 16}
+LOW_NOISE = {"snr_db": 80.0, "adc_bits": 16}
 MILD = {
     "contact_log_sd": 0.3, "misplaced_mm": 0.5, "uneven": 0.05, "drift": 0.003,
     "contact_drift": 0.03, "amplitude_drift": 0.003,
@@ -74,8 +74,8 @@ WORLDS = {
     "ellipses": World(aspect=(1.4, 2.2), shape="ellipse"),
     "fingers": World(**FINGERS),
     "two_fingers_12_to_16_mm": World((2, 2), (5.0, 8.0), pair_mm=(12.0, 16.0), **FINGERS),
-    "eight_at_4_radii": World(**EIGHT, **QUIET),
-    "eight_mild_errors": World(**EIGHT, **QUIET, **MILD),
+    "eight_at_4_radii": World(**EIGHT, **LOW_NOISE),
+    "eight_mild_errors": World(**EIGHT, **LOW_NOISE, **MILD),
     "uneven_20_percent": World(uneven=0.2),
     "misplaced_3_mm": World(misplaced_mm=3.0),
     "out_of_round_2_percent": World(out_of_round=0.02),
@@ -90,10 +90,10 @@ WORLDS = {
 
 @dataclass(frozen=True, eq=False)
 class WorldScenes:
-    """Scene k has ``quiet_v[k]`` (q, m) for its tare and ``frames_v[k]`` (m,), in V."""
+    """Scene k has ``untouched_v[k]`` (q, m) for its tare and ``frames_v[k]`` (m,), in V."""
 
     scenes: tuple[TouchScene, ...]
-    quiet_v: np.ndarray
+    untouched_v: np.ndarray
     frames_v: np.ndarray
 
 
@@ -124,7 +124,7 @@ class WorldFactory:
     def scenes(self, name: str, count: int, seed: int) -> WorldScenes:
         """``count`` scenes of the set ``name``."""
         world, role = WORLDS[name], f"worlds tuning {name}"
-        drawn, quiet_v, frames_v = [], [], []
+        drawn, untouched_v, frames_v = [], [], []
         for k in range(count):
             touches = draw_touches(self.skin, world, stream(seed, f"{role} touches", k))
 
@@ -134,9 +134,9 @@ class WorldFactory:
             exact_v = self._solve(world, touches, draw)
             noisy_v = _measured(exact_v, world, seed, f"{role} {k}")
             drawn.append(TouchScene(f"{name} {k}", touches))
-            quiet_v.append(noisy_v[:-1])
+            untouched_v.append(noisy_v[:-1])
             frames_v.append(noisy_v[-1])
-        return WorldScenes(tuple(drawn), np.array(quiet_v), np.array(frames_v))
+        return WorldScenes(tuple(drawn), np.array(untouched_v), np.array(frames_v))
 
     def _solve(self, world: World, touches: tuple[TrueTouch, ...], draw: Draws) -> np.ndarray:
         """The untouched and the touched frame (2, m) of one skin."""

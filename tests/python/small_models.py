@@ -98,7 +98,7 @@ class Small:
         ]
         return np.array(clean) + sigma * generator.normal(size=(count, len(v0)))
 
-    def quiet(self, seed: int, count: int, noise: float = 1e-3) -> FloatArray:
+    def untouched(self, seed: int, count: int, noise: float = 1e-3) -> FloatArray:
         """Frames (count, m) V of the untouched skin with white noise of ``noise`` rms(V0)."""
         generator, v0 = np.random.default_rng(seed), self.linear.v0_v
         return v0 + noise * float(np.sqrt(np.mean(v0**2))) * generator.normal(size=(count, len(v0)))
@@ -153,7 +153,7 @@ def prebuilt() -> tuple[Model, bytes]:
 @cache
 def session(role: str = "test", scenes: int = 20, seed: int = 3, snr_db: float = 60.0) -> Simulated:
     """The paper's skin, touched one to three times a scene, simulated nonlinearly on another mesh
-    with 64 quiet frames."""
+    with 64 untouched frames."""
     skin = paper_skin()
     touches = random_touches(skin.outline, seed, scenes, role)
     return simulate(skin, adjacent(16), touches, measurement=Measurement(snr_db=snr_db))

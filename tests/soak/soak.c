@@ -237,7 +237,7 @@ static void one_frame(uint64_t k)
     } else if (k % 101 == 7) {
         for (uint32_t i = 0; i < model.n_rows; i += 1 + i % 2)
             frame[i] = R(NAN);
-        reconstruct(EITS_E_FRAME_CHANNELS, masked);
+        reconstruct(EITS_E_FRAME_ROWS, masked);
     } else {
         reconstruct(EITS_OK, masked + (k % 17 == 3 ? break_rows(1 + hand_draw(&fingers, 8)) : 0));
     }

@@ -43,8 +43,8 @@ typedef struct eits_fast_touch {
 /* Bits: what eits_fast_align says of a frame. */
 typedef enum eits_fast_frame {
     EITS_FAST_EXPLAINED = 1, /* all its drives are accounted for by touches */
-    /* what the whole-frame solver says of it may be told: it is explained, or frames have not been
-     * for a while, and something else is wrong */
+    /* what the whole-frame solver says of it may be reported: it is explained, or frames have not
+     * been for a while, and something else is wrong */
     EITS_FAST_TRUSTED = 2
 } eits_fast_frame;
 

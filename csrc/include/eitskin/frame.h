@@ -32,7 +32,7 @@ extern "C" {
 
 /* Take one frame as the reference. Noise and lambda_noise stay unknown (0), so that no touch is
  * below the detection threshold. Errors: EITS_E_ARGUMENT, EITS_E_FRAME_LENGTH,
- * EITS_E_FRAME_CHANNELS, EITS_E_FRAME_ZERO; the old reference then stays. */
+ * EITS_E_FRAME_ROWS, EITS_E_FRAME_ZERO; the old reference then stays. */
 eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t length);
 
 /* Learn reference and noise from `count` >= 4 frames of the untouched skin: begin, add each,
@@ -54,7 +54,7 @@ eits_status eits_mask_row(eits_context *ctx, uint32_t row, int masked);
 
 /* The frame stage alone: it leaves reduced data for eits_solve, and row and electrode states.
  * `masked` gets the number of rows left out, `macs` the multiply-accumulates. Errors:
- * EITS_E_ARGUMENT, EITS_E_NO_REFERENCE, EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS,
+ * EITS_E_ARGUMENT, EITS_E_NO_REFERENCE, EITS_E_FRAME_LENGTH, EITS_E_FRAME_ROWS,
  * EITS_E_FRAME_ZERO, EITS_E_NOT_FINITE. */
 eits_status eits_frame_stage(eits_context *ctx, const eits_real *frame, size_t length,
                              uint32_t *masked, uint64_t *macs);

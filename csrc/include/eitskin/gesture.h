@@ -38,9 +38,9 @@ typedef struct eits_contact {
     eits_real seen_x_mm, seen_y_mm; /* where it was last found, letting go or not */
     /* strength in S mm2/m, smoothed, without its sign; fraction of the data that it explains */
     eits_real strength, explained;
-    eits_real start_x_mm, start_y_mm; /* where it landed */
-    eits_real told_x_mm, told_y_mm;   /* the place that was last reported */
-    eits_real farthest_mm;            /* its greatest distance from where it landed */
+    eits_real start_x_mm, start_y_mm;       /* where it landed */
+    eits_real reported_x_mm, reported_y_mm; /* the place that was last reported */
+    eits_real farthest_mm;                  /* its greatest distance from where it landed */
 } eits_contact;
 
 /* Two fingers that may make a gesture together; for use inside the library. */
@@ -50,9 +50,9 @@ typedef struct eits_finger_pair {
     uint32_t kind; /* eits_event_kind; 0: nothing yet */
     /* their distance when both were down, and how far they have turned since, counterclockwise */
     eits_real base_mm, turned_deg;
-    eits_real dx_mm, dy_mm;      /* from the first to the second, when both were last seen */
-    eits_real extreme_mm;        /* least distance of a pinch, greatest of a spread */
-    eits_real told_mm, told_deg; /* as last reported */
+    eits_real dx_mm, dy_mm; /* from the first to the second, when both were last seen */
+    eits_real extreme_mm;   /* least distance of a pinch, greatest of a spread */
+    eits_real reported_mm, reported_deg; /* as last reported */
 } eits_finger_pair;
 
 /* The whole state, 5,540 bytes in float32. It has no pointers, so a copy works on its own. Programs
@@ -68,7 +68,7 @@ typedef struct eits_gestures {
 } eits_gestures;
 
 /* The default options. Errors: EITS_E_ARGUMENT. */
-eits_status eits_gestures_usual(eits_gesture_options *options);
+eits_status eits_gestures_default(eits_gesture_options *options);
 
 /* Begin with no finger down; `options` NULL stands for the default ones. Errors: EITS_E_ARGUMENT if
  * a length or fraction is below 0 or not finite; the state is then unchanged. */
@@ -76,14 +76,14 @@ eits_status eits_gestures_init(eits_gestures *gestures, const eits_gesture_optio
 
 /* Take the `count` touches of a frame, as eits_find_touches reports them with tracking on, measured
  * at `time_us`, a clock that may wrap. Writes the frame's events to `events`, which has room for
- * `room`, and their number to `told`; events beyond `room` are counted in `dropped`. Do not call it
- * for a frame that the core rejected. A touch whose place or strength is not finite is ignored. A
- * frame with the time of the last one gives no events. After a long gap, or if time goes back, all
- * fingers count as lifted, without a gesture. Errors: EITS_E_ARGUMENT (count above
+ * `room`, and their number to `reported`; events beyond `room` are counted in `dropped`. Do not
+ * call it for a frame that the core rejected. A touch whose place or strength is not finite is
+ * ignored. A frame with the time of the last one gives no events. After a long gap, or if time goes
+ * back, all fingers count as lifted, without a gesture. Errors: EITS_E_ARGUMENT (count above
  * EITS_MAX_TOUCHES, or NULL). */
 eits_status eits_gestures_update(eits_gestures *gestures, const eits_touch *touches, uint32_t count,
                                  uint32_t time_us, eits_event *events, uint32_t room,
-                                 uint32_t *told);
+                                 uint32_t *reported);
 
 #ifdef __cplusplus
 }

@@ -42,7 +42,7 @@ typedef enum eits_event_kind {
     EITS_EVENT_RELEASE = 12
 } eits_event_kind;
 
-/* Where an event lies in what it tells of. */
+/* Where an event lies in what it reports. */
 typedef enum eits_event_phase {
     /* all of it */
     EITS_PHASE_ONCE = 0,
@@ -78,7 +78,8 @@ typedef struct eits_event {
     eits_real value;
 } eits_event;
 
-/* What makes a gesture. eits_gestures_usual fills it in; tables/constants.toml has the reasons. */
+/* What makes a gesture. eits_gestures_default fills it in; tables/constants.toml has the
+ * reasons. */
 typedef struct eits_gesture_options {
     /* a finger that is not found for so long has lifted */
     uint32_t lost_us;
@@ -102,7 +103,7 @@ typedef struct eits_gesture_options {
     uint32_t speed_us;
     /* see rejoin_us */
     eits_real rejoin_mm;
-    /* least step that a MOVE or a CHANGE tells */
+    /* least step that a MOVE or a CHANGE reports */
     eits_real move_mm;
     /* a tap or hold stays within so far of where it landed */
     eits_real still_mm;

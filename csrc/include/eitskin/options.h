@@ -55,7 +55,7 @@ typedef enum eits_touch_fit {
 } eits_touch_fit;
 #define EITS_TOUCH_FIT_ALL 7u
 
-/* The options. Lambdas are in the units of S'y. docs/reference/options.md lists usual values and
+/* The options. Lambdas are in the units of S'y. docs/reference/options.md lists default values and
  * ranges. */
 typedef struct eits_options {
     /* the maximum number of iterations; FISTA runs exactly so many if gap_rel is 0 */

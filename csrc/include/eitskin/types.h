@@ -47,7 +47,7 @@ typedef enum eits_status {
     EITS_E_MODEL_VALUE = -8,
     EITS_E_MODEL_ALIGNMENT = -9, /* the blob does not start at a 16-byte boundary */
     EITS_E_FRAME_LENGTH = -10,   /* a frame's length is not the number of protocol rows */
-    EITS_E_FRAME_CHANNELS = -11, /* more rows cannot be used than options.max_masked allows */
+    EITS_E_FRAME_ROWS = -11,     /* more rows cannot be used than options.max_masked allows */
     /* the reference or another frame is all zero, or contains only noise: the front end is dead */
     EITS_E_FRAME_ZERO = -12,
     EITS_E_NO_REFERENCE = -13, /* a frame came before the reference frame was set */

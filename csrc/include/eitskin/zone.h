@@ -43,10 +43,10 @@ typedef struct eits_zones {
 eits_status eits_zones_init(eits_zones *zones, const eits_zone *zone, uint32_t count);
 
 /* Report the presses and releases that a frame's `count` events cause, in their order: into `out`,
- * which has room for `room`, and their number into `told`. Those beyond `room` are counted in
+ * which has room for `room`, and their number into `reported`. Those beyond `room` are counted in
  * `dropped`. Errors: EITS_E_ARGUMENT (NULL). */
 eits_status eits_zones_update(eits_zones *zones, const eits_event *events, uint32_t count,
-                              eits_event *out, uint32_t room, uint32_t *told);
+                              eits_event *out, uint32_t room, uint32_t *reported);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,6 @@
-/* What a context knows, for its users: who may not look into it. The struct is private so that its
- * parts can change without a change of the interface. Pointers stay valid as long as the context;
- * what they point to is that of the last frame, and changes with the next. */
+/* These functions read a context for its users. The struct is private so that its members can
+ * change without a change of the interface. Pointers stay valid as long as the context; the numbers
+ * behind them are those of the last frame and change with the next. */
 #include "context/context.h"
 
 const eits_model *eits_get_model(const eits_context *ctx)
@@ -18,14 +18,14 @@ const eits_info *eits_get_info(const eits_context *ctx)
     return &ctx->info;
 }
 
-/* Zeros where the last frame was rejected, so that a caller who overlooks the status shows nothing.
- */
+/* The image is zero if the last frame was rejected, so that a caller who overlooks the status shows
+ * nothing. */
 const eits_real *eits_get_image(const eits_context *ctx)
 {
     return ctx->solver.image;
 }
 
-/* The image before the column weights: what a warm start begins from. */
+/* The image before the column weights; a warm start begins from these coefficients. */
 const eits_real *eits_get_coefficients(const eits_context *ctx)
 {
     return ctx->solver.x;
@@ -46,7 +46,8 @@ const uint8_t *eits_get_electrode_states(const eits_context *ctx)
     return ctx->rows.electrode;
 }
 
-/* What the user left out; what a frame could not use besides is in the row states. */
+/* Returns 1 for a row that the user masked. The row states name the rows that a frame could not use
+ * besides these. */
 int eits_is_masked(const eits_context *ctx, uint32_t row)
 {
     return ctx->rows.masked[row] != 0;
@@ -56,7 +57,7 @@ eits_status eits_get_reference(const eits_context *ctx, eits_reference_info *ref
 {
     if (ctx == NULL || reference == NULL)
         return EITS_E_ARGUMENT;
-    /* numbers by value; v0 is the context's own, and changes with the next tare */
+    /* numbers are copied; v0 points into the context and changes with the next tare */
     const eits_reference *r = &ctx->reference;
     *reference =
         (eits_reference_info){r->v0,          r->count,   r->ready,        r->v0_rms,  r->gain,

@@ -1,7 +1,7 @@
 /* The frame stage: from voltages to reduced data frame.y for any solver, with diagnostics on the
  * way.
  *
- * Finding faults and computing data depend on each other, so the order is:
+ * Finding faults and computing data depend on each other. The order is therefore:
  *
  *   1. faults that a row shows by itself (not a number, saturated);
  *   2. faults of electrodes, from all their rows;
@@ -9,8 +9,8 @@
  *   4. reduce; model mismatch, from reduced data; fold and reduce again without a fold that it
  * names.
  *
- * Each step back happens at most once, so that the time of a frame is bounded whatever is wrong
- * with it.
+ * Each step back happens at most once, so that the time per frame is bounded whatever is wrong with
+ * the frame.
  *
  * In: the voltages, the reference. Out: frame.*, rows.*, the diagnostics in info, the number of
  * rows left out in `masked`, and `macs`. Errors are returned for frames that have no image: too
@@ -24,11 +24,11 @@
 #include "frame/fold.h"
 #include "frame/whitening.h"
 
-/* Why each row of this frame cannot be used, as far as the row itself tells.
+/* Find the rows of this frame that cannot be used, as far as each row shows this by itself.
  *
- * A row whose reference is no number was masked in the tare: there is nothing to compare it with,
- * whatever the mask says now. Saturated rows that are masked are not counted: who masked them
- * knows. */
+ * A row whose reference is NaN was masked in the tare: there is nothing to compare it with, even if
+ * its mask was lifted since. Saturated rows that are masked are not counted: the user who masked
+ * them knows about them. */
 static void find_unusable(eits_context *ctx, const eits_real *frame)
 {
     const eits_real limit = ctx->options.saturation_v;
@@ -62,7 +62,7 @@ static void clear_diagnostics(eits_context *ctx)
     memset(ctx->rows.electrode, 0, sizeof ctx->rows.electrode);
 }
 
-/* A frame of nothing but zeros is a dead front end, not an untouched skin. */
+/* A frame of zeros only comes from a dead front end, not from an untouched skin. */
 static int is_dead(const eits_context *ctx, const eits_real *frame)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
@@ -72,13 +72,13 @@ static int is_dead(const eits_context *ctx, const eits_real *frame)
     return 1;
 }
 
-/* What reduced data say of the frame: 1 where a row was marked, so that it is to be folded again.
- */
+/* Examine the reduced data. Returns 1 if a row was marked, so that the frame has to be folded
+ * again. */
 static int examine_reduced(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {
     if (!ctx->range.known || !eits_check_model_mismatch(ctx, scratch, macs))
         return 0;
-    /* by turned rows: then it is no single fold */
+    /* the mismatch comes from rows with reversed sign, so no single fold explains it */
     const int known = (ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0;
     if (!known && eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER) &&
         eits_find_unpaired_outlier(ctx, scratch, macs)) {
@@ -94,8 +94,8 @@ static eits_status check_rows(const eits_context *ctx, const eits_real *frame, u
 {
     *masked = count_unusable(ctx);
     if (*masked > ctx->options.max_masked)
-        return EITS_E_FRAME_CHANNELS;
-    /* With every row out there is no reading that could be zero; max_masked has allowed it. */
+        return EITS_E_FRAME_ROWS;
+    /* If every row is left out, which max_masked allowed, no reading is left that could be zero. */
     return *masked < ctx->model->n_rows && is_dead(ctx, frame) ? EITS_E_FRAME_ZERO : EITS_OK;
 }
 
@@ -103,12 +103,12 @@ eits_status eits_frame_data(eits_context *ctx, const eits_scratch *scratch, cons
                             uint32_t *masked, uint64_t *macs)
 {
     const eits_model *model = ctx->model;
-    /* without a reference there is nothing to judge by */
+    /* without a reference there is nothing to compare the frame with */
     const int judged = ctx->reference.ready != 0;
     *macs = 0;
     clear_diagnostics(ctx);
     find_unusable(ctx, frame);
-    /* Electrodes first: their rows would otherwise be counted as so many outliers. */
+    /* Electrodes are checked first: otherwise each of their rows would be counted as an outlier. */
     const int dead = judged && !eits_find_electrodes(ctx, frame);
     eits_status status = check_rows(ctx, frame, masked);
     if (status == EITS_OK && dead)
@@ -124,8 +124,8 @@ eits_status eits_frame_data(eits_context *ctx, const eits_scratch *scratch, cons
     }
     if (ctx->projection.stale)
         *macs += eits_build_basis(ctx, scratch);
-    /* The model tells what data it can give only of a whole frame: with rows left out P d is no
-     * projection on its range any more. */
+    /* The model's range can be tested only for a frame without left-out rows: with rows left out, P
+     * d is no longer a projection on that range. */
     uint32_t count = eits_reduce_frame(ctx, scratch, macs);
     if (count == model->n_folded && judged && examine_reduced(ctx, scratch, macs)) {
         status = check_rows(ctx, frame, masked);
@@ -141,13 +141,14 @@ eits_status eits_frame_data(eits_context *ctx, const eits_scratch *scratch, cons
     ctx->frame.has_y_log = judged && model->data_kind == EITS_DATA_DIFFERENCE &&
                            (ctx->options.touch_fit & EITS_TOUCH_FIT_LOG_DATA) != 0;
     *macs += ctx->frame.has_y_log ? eits_reduce_log(ctx, scratch, frame) : 0;
-    /* Fewer folds than directions: the triangle makes up the rest of them from e, which is no data.
-     */
+    /* If there are fewer folds than directions, the triangle fills the remaining directions from e,
+     * which is not data. */
     const uint32_t directions = ctx->whitening.form && count < model->rank ? count : model->rank;
-    if (ctx->projection.count >= directions) /* no direction is left: what is there is rounding */
+    if (ctx->projection.count >=
+        directions) /* no direction is left: the numbers are rounding errors */
         eits_zero(ctx->frame.y, model->rank);
-    /* The square and not each number: solvers square y, so that one whose square overflows is of no
-     * more use than an infinite one. */
+    /* The square is tested and not each number: solvers square y, so a frame whose square overflows
+     * is as useless as an infinite one. */
     return eits_is_finite(eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, model->rank))
                ? EITS_OK
                : EITS_E_NOT_FINITE;
@@ -171,8 +172,8 @@ eits_status eits_frame_stage(eits_context *ctx, const eits_real *frame, size_t l
     return status == EITS_OK ? eits_frame_data(ctx, &ctx->scratch, frame, masked, macs) : status;
 }
 
-/* Which sides are in use decides when the next solved frame builds its basis again, and so its
- * MACs: they are put back. */
+/* The sides in use decide when the next solved frame builds its basis again, and so its MACs.
+ * Examining a frame must not change this, so the sides are restored. */
 eits_status eits_examine(eits_context *ctx, const eits_real *frame, size_t length)
 {
     eits_status status = check_call(ctx, frame, length);

@@ -1,7 +1,8 @@
-/* From a frame, or from its reduced data, to an image.
+/* Compute an image from a frame or from its reduced data.
  *
- * Frame stage, then solve. A frame that the first refuses still leaves a defined state: an image of
- * zeros, and info says why, so that a caller that goes on after an error shows no old image. */
+ * The frame stage runs first, then the solver. If the frame stage rejects a frame, the state is
+ * still defined: the image is zero and info says why, so that a caller that goes on after an error
+ * shows no old image. */
 #include "eitskin/frame.h"
 #include "eitskin/solve.h"
 
@@ -15,10 +16,10 @@ eits_status eits_solve(eits_context *ctx, const eits_real *y)
 {
     if (ctx == NULL)
         return EITS_E_ARGUMENT;
-    /* without y: the data that the last frame stage left */
+    /* if y is NULL, the data of the last frame stage are solved */
     if (y != NULL) {
         eits_copy(ctx->frame.y, y, ctx->model->rank);
-        ctx->frame.has_y_log = 0; /* of another frame */
+        ctx->frame.has_y_log = 0; /* it belongs to another frame */
     }
     ctx->info = (eits_info){0};
     return eits_solve_frame(ctx, &ctx->scratch, ctx->options.warm_start != 0);
@@ -45,7 +46,8 @@ eits_status eits_reconstruct(eits_context *ctx, const eits_real *frame, size_t l
     return status;
 }
 
-/* The solver adds to what info has counted: iterations and step halvings start again from zero. */
+/* Solve from zero. The solver adds to the counts of iterations and step halvings in info, so these
+ * are reset first. */
 static void solve_from_zero(eits_context *ctx, const eits_scratch *scratch)
 {
     ctx->info.iterations = ctx->info.step_halvings = 0;
@@ -56,17 +58,17 @@ void eits_solve_again(eits_context *ctx, const eits_scratch *scratch, const eits
 {
     const eits_info before = ctx->info;
     const size_t stride = EITS_STRIDE(ctx->model->rank);
-    eits_copy(ctx->frame.y_log, ctx->frame.y, stride); /* of no more use for this frame */
+    eits_copy(ctx->frame.y_log, ctx->frame.y, stride); /* no longer needed */
     ctx->frame.has_y_log = 0;
     eits_copy(ctx->frame.y, y, stride);
     solve_from_zero(ctx, scratch);
-    /* The interaction is an estimate. If it leaves nothing of a frame with two touches, or a result
-     * that is not finite, it was wrong. */
+    /* The interaction is an estimate. It was wrong if it leaves nothing of a frame with two touches
+     * or gives a result that is not finite; then the frame's own data are solved again. */
     if (!ctx->solver.warm) {
         eits_copy(ctx->frame.y, ctx->frame.y_log, stride);
         solve_from_zero(ctx, scratch);
     }
     ctx->info.iterations += before.iterations;
     ctx->info.step_halvings += before.step_halvings;
-    ctx->info.diagnostics = before.diagnostics; /* judged by the frame as it came */
+    ctx->info.diagnostics = before.diagnostics; /* those of the measured frame */
 }

@@ -1,14 +1,14 @@
 /* The reference frame and its noise, from one frame or learned from many.
  *
  * Learning takes one frame after the other and stores none. The first half of the frames makes a
- * mean. The second half is measured against it as later frames will be. Their greatest max |S'y| is
- * lambda_noise: the worst that the untouched skin shows, in the unit of the detection threshold and
- * of lambda. A threshold needs this maximum rather than an rms, and it grows only slowly with the
- * number of frames.
+ * mean. The second half is compared with it as later frames will be. The greatest max |S'y| of the
+ * second half is lambda_noise: the largest value that the untouched skin shows, in the unit of the
+ * detection threshold and of lambda. A threshold needs this maximum rather than an rms, and it
+ * grows only slowly with the number of frames.
  *
  * Outliers are left out on the way (diagnostics/reference_outliers.c). After an error,
- * eits_reference_set keeps the reference that there was; once learning has begun there is none
- * (ready = 0). */
+ * eits_reference_set keeps the previous reference; once learning has begun there is no reference
+ * (ready = 0) until it is finished. */
 #include "eitskin/frame.h"
 
 #include "api/constants.h"
@@ -19,7 +19,8 @@
 #include "frame/reference.h"
 #include "frame/whitening.h"
 
-/* Coefficients for another reference are not a valid start. */
+/* Fit the new reference to the model. Coefficients for another reference are not a valid start, so
+ * they are dropped. */
 static eits_status fit(eits_context *ctx)
 {
     ctx->solver.warm = 0;
@@ -37,15 +38,15 @@ eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t
     if (status != EITS_OK)
         return status;
     eits_reference *b = &ctx->reference;
-    /* A frame that turns out to be of no use must not cost the reference that there is. */
+    /* The new frame may turn out to be useless; the previous reference must survive that. */
     eits_real *old = b->m2; /* keeps the old reference until the new one is known to be good */
     b->wanted = 0;          /* learning, if any was under way, ends here */
     eits_copy(old, b->v0, length);
     eits_copy(b->v0, frame, length);
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         if (ctx->rows.masked[i])
-            /* and not 0: a mask that is lifted later must not bring back a row that was never
-             * measured */
+            /* NaN and not 0: if the mask is lifted later, this row was still never measured and
+             * must stay unused */
             b->v0[i] = R(NAN);
     }
     status = fit(ctx);
@@ -74,7 +75,7 @@ eits_status eits_reference_begin(eits_context *ctx, uint32_t count)
     eits_zero(b->m2, ctx->model->n_rows);
     b->wanted = count;
     b->count = 0;
-    /* Until it is done frames are rejected: half a mean would show touches that nobody made. */
+    /* Frames are rejected until learning is finished: half a mean would show false touches. */
     b->ready = 0;
     b->lambda_noise = 0;
     b->noise_v = 0;
@@ -83,7 +84,7 @@ eits_status eits_reference_begin(eits_context *ctx, uint32_t count)
     return EITS_OK;
 }
 
-/* How far a reference frame reaches above nothing: max |S'y| against the mean so far. */
+/* Take max |S'y| of a reference frame, compared with the mean so far, into lambda_noise. */
 static eits_status learn_lambda_noise(eits_context *ctx, const eits_scratch *scratch,
                                       const eits_real *frame)
 {
@@ -95,7 +96,7 @@ static eits_status learn_lambda_noise(eits_context *ctx, const eits_scratch *scr
     eits_apply_t(ctx, eits_adjoint(ctx, ctx->frame.y, scratch->row[4]), scratch->pixel[0]);
     if (!eits_all_finite(scratch->pixel[0], ctx->model->n_pixels))
         return EITS_E_NOT_FINITE;
-    /* Divided by what this whitening makes of noise, so that it serves other rows and
+    /* The value is divided by this whitening's gain for noise, so that it serves for other rows and
      * regularisations. */
     const eits_real seen =
         eits_greatest(ctx->kernels, scratch->pixel[0], ctx->model->n_pixels, EITS_SIGN_BOTH) /
@@ -114,8 +115,8 @@ eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t
     if (status != EITS_OK)
         return status;
     const int judged = eits_wants(ctx, EITS_DIAGNOSTIC_OUTLIER);
-    /* Of two frames that differ in a reading nobody knows which is wrong: the third decides. From
-     * then on frames are compared with the mean. */
+    /* If two frames differ in a reading, the third frame decides which one is wrong. From then on
+     * frames are compared with the mean. */
     if (b->count == 1 && judged) {
         eits_keep_second_frame(ctx, frame);
         return EITS_OK;
@@ -126,9 +127,9 @@ eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t
     }
     const uint32_t left =
         b->count >= 2 && judged ? eits_reference_mask_outliers(ctx, &ctx->scratch, frame) : 0;
-    /* The second half is measured against the mean of the first: a frame measured against a mean
-     * that contains it would show too little noise. noise_v so far is enough to raise the
-     * regularisation as it will be raised for the frames to come. */
+    /* The second half is compared with the mean of the first: a frame compared with a mean that
+     * contains it would show too little noise. noise_v of the frames so far is enough to raise the
+     * regularisation as it will be raised for later frames. */
     if (b->count == b->wanted / 2) {
         status = fit(ctx);
         /* lambda_noise is learned with the regularisation that it asks for */
@@ -142,7 +143,7 @@ eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t
         eits_take_reference_frame(ctx, frame);
         b->outliers += left;
     }
-    /* Readings were left out of this frame alone. */
+    /* The readings were left out of this frame only. */
     eits_reference_unmask(ctx);
     return status;
 }
@@ -157,8 +158,8 @@ eits_status eits_reference_finish(eits_context *ctx)
     const eits_status status = fit(ctx);
     if (status != EITS_OK)
         return status;
-    /* A tare of equal frames has no noise, and then any difference would be a touch: what rounding
-     * and a converter's steps leave is the least. */
+    /* A tare of equal frames has no noise, and then any difference would be a touch. The lower
+     * limit is the noise that rounding and a converter's steps leave. */
     const eits_real noise_v = eits_reference_noise(ctx), floor_v = eits_noise_floor_v(ctx),
                     lambda_floor = eits_lambda_noise_floor(ctx);
     b->noise_v = eits_larger(noise_v, floor_v);

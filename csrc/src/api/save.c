@@ -1,19 +1,20 @@
-/* What a tare costs time to learn, put by in the caller's memory.
+/* Save in the caller's memory what a tare takes time to learn.
  *
- * For a board that swaps models or runs the self-test, and must not ask the user to take hands off
- * the skin again. The bytes are those of this build: they are for the same program and the same
- * model, not for a file. The size is a macro as well as a function, so that memory can be static;
- * the assertion below keeps the two together. */
+ * A board that swaps models or runs the self-test needs this, since it must not ask the user to
+ * take the hands off the skin again. The bytes have the layout of this build: they are for the same
+ * program and the same model, not for a file. The size is a macro as well as a function, so that
+ * memory can be static; the assertion below keeps the two together. */
 #include "context/context.h"
 
 #include "base/vec.h"
 #include "frame/reference.h"
 
-/* Followed by v0 and by the masked rows. The reference's pointers are of no use in it.
+/* v0 and the masked rows follow this struct in memory. The pointers in `reference` have no meaning
+ * in it.
  *
- * Only what cannot be found again from the model and a frame; the basis is built again, which
- * costs MACs once. Followed touches are not in it: by the time that it is restored they have
- * moved. */
+ * The struct has only data that cannot be computed again from the model and a frame; the basis is
+ * built again, which costs MACs once. Tracked touches are not saved: they have moved by the time of
+ * the restore. */
 typedef struct saved {
     eits_options options;
     uint32_t next_id;
@@ -49,7 +50,7 @@ eits_status eits_save(const eits_context *ctx, void *memory, size_t size)
     memcpy(to, &head, sizeof head);
     to += EITS_ALIGN16(sizeof head);
     memcpy(to, r->v0, rows * sizeof r->v0[0]);
-    /* They belong to the reference: where a row was masked v0 is no number. */
+    /* The masked rows belong to the reference: v0 is NaN where a row was masked. */
     memcpy(to + EITS_REALS(rows), ctx->rows.masked, rows);
     return EITS_OK;
 }
@@ -68,7 +69,8 @@ eits_status eits_restore(eits_context *ctx, const void *memory, size_t size)
     from += EITS_ALIGN16(sizeof head);
     ctx->options = head.options;
     ctx->tracker.next_id = head.next_id;
-    /* The deviations m2 are of a tare under way, and none is: they are not among what is saved. */
+    /* The deviations m2 belong to a tare under way. None is under way here, so they are not saved.
+     */
     *r = (eits_reference){.v0 = r->v0,
                           .m2 = r->m2,
                           .row_gain = r->row_gain,
@@ -82,8 +84,8 @@ eits_status eits_restore(eits_context *ctx, const void *memory, size_t size)
                           .lambda_noise = head.lambda_noise};
     memcpy(r->v0, from, rows * sizeof r->v0[0]);
     memcpy(ctx->rows.masked, from + EITS_REALS(rows), rows);
-    /* They follow from v0 and the model, as at the tare. Touches of before would be other fingers.
-     */
+    /* Row gains follow from v0 and the model, as at the tare. Touches of the time before would be
+     * other fingers. */
     eits_learn_row_gains(ctx);
     eits_forget(ctx);
     return EITS_OK;

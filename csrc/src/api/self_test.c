@@ -6,9 +6,9 @@
  * (difference 0; within rounding in float64). In: the section GOLD. Out: the greatest deviation
  * over the image's peak. It replaces the reference: a caller saves its own before (eits_save).
  *
- * One image says nothing of the code that it did not run. The section SUMS has a checksum for each
- * of a set of frames made of these two: a row's noise, a lost electrode, each solver and sign,
- * touches with their test, a learned reference. No frame is stored for it. */
+ * One image cannot test code that did not run for it. The section SUMS therefore has a checksum for
+ * each of a set of frames made from these two: with noise on the rows, a lost electrode, each
+ * solver and sign, touches with their test, a learned reference. No frame is stored for it. */
 #include "base/vec.h"
 #include "context/context.h"
 #include "eitskin/frame.h"
@@ -24,9 +24,9 @@ _Static_assert(TRIALS < EITS_SELF_TEST_SUMS, "the others are of scenes");
 typedef struct trial {
     eits_solver solver;
     eits_sign sign;
-    eits_real strength; /* of what touches the skin in the golden frame */
+    eits_real strength; /* factor on the touch's part of the golden frame */
     eits_real gap_rel;
-    uint32_t lost;    /* 1: an electrode is */
+    uint32_t lost;    /* 1: an electrode is lost */
     uint32_t learned; /* 1: the reference is learned from touched frames too */
 } trial;
 
@@ -49,7 +49,8 @@ static eits_status learn(eits_context *ctx, const trial *t)
     return status == EITS_OK ? eits_reference_finish(ctx) : status;
 }
 
-/* The golden frame with the trial's strength, each row with noise of 2^-13 of itself. */
+/* Make the golden frame with the trial's strength; each row has noise of about 2^-13 of its voltage
+ * (rms). */
 static void make_frame(const eits_context *ctx, const trial *t, eits_real *frame)
 {
     const eits_model *model = ctx->model;
@@ -65,12 +66,12 @@ static void make_frame(const eits_context *ctx, const trial *t, eits_real *frame
     }
 }
 
-/* Options of a trial, and the reference learned with them. */
+/* Set the options of a trial and learn the reference with them. */
 static uint32_t begin_trial(eits_context *ctx, const trial *t)
 {
     eits_options options;
     (void)eits_options_default(ctx->model, &options);
-    options.iterations = 12; /* the bits of a few are as good a sign as those of all */
+    options.iterations = 12; /* a few iterations show a difference of bits as well as all would */
     options.solver = t->solver;
     options.sign = t->sign;
     options.gap_rel = t->gap_rel;
@@ -81,7 +82,7 @@ static uint32_t begin_trial(eits_context *ctx, const trial *t)
     return eits_crc32(0, status, sizeof status);
 }
 
-/* Touches, and what is told of them and of the image. */
+/* Add the touches, and the numbers reported about them and the image, to the checksum. */
 static uint32_t add_result(eits_context *ctx, uint32_t sum)
 {
     eits_touch touches[EITS_MAX_TOUCHES];
@@ -90,23 +91,24 @@ static uint32_t add_result(eits_context *ctx, uint32_t sum)
     (void)eits_find_touches(ctx, touches, EITS_MAX_TOUCHES, &count);
     sum = eits_crc32(sum, touches, count * sizeof touches[0]);
     const eits_info *info = &ctx->info;
-    const eits_real told[] = {info->lambda,         info->lambda_noise, info->gap_rel,
-                              info->residual,       info->data_norm,    info->unexplained,
-                              info->model_mismatch, ctx->reference.gain};
-    return eits_crc32(sum, told, sizeof told);
+    const eits_real reported[] = {info->lambda,         info->lambda_noise, info->gap_rel,
+                                  info->residual,       info->data_norm,    info->unexplained,
+                                  info->model_mismatch, ctx->reference.gain};
+    return eits_crc32(sum, reported, sizeof reported);
 }
 
 static uint32_t run_trial(eits_context *ctx, const trial *t)
 {
     uint32_t sum = begin_trial(ctx, t);
-    eits_real *frame = ctx->reference.m2; /* of no more use once the reference is learned */
+    eits_real *frame = ctx->reference.m2; /* m2 is free once the reference is learned */
     make_frame(ctx, t, frame);
     const int32_t status = eits_reconstruct(ctx, frame, ctx->model->n_rows, NULL, NULL);
     return add_result(ctx, eits_crc32(sum, &status, sizeof status));
 }
 
-/* Reduced data of one to four touches two pixels wide, some of them side by side, all over the
- * skin: what the golden frame's two do not show of fit, merging, splitting and test. */
+/* Make reduced data of one to four touches, two pixels wide, all over the skin and sometimes side
+ * by side: they test parts of fit, merging, splitting and test that the golden frame's two touches
+ * do not reach. */
 static void make_data(const eits_context *ctx, eits_real norm, uint32_t *random, eits_real *y)
 {
     const uint32_t rank = ctx->model->rank, pixels = ctx->model->n_pixels;
@@ -183,10 +185,10 @@ eits_status eits_self_test(eits_context *ctx, eits_real *difference)
     if (ctx == NULL || difference == NULL)
         return EITS_E_ARGUMENT;
     const eits_model *model = ctx->model;
-    /* n_rows numbers that a single reference frame leaves unused
+    /* m2 has n_rows numbers that a single reference frame leaves unused.
      *
-     * Room for a frame without asking the caller for it; squares of deviations are zero again
-     * afterwards, as eits_reference_set leaves them. */
+     * So the caller need not give memory for a frame. Afterwards the squares of deviations are zero
+     * again, as eits_reference_set leaves them. */
     eits_real *frame = ctx->reference.m2;
     *difference = 0;
     const eits_status sums = compare_sums(ctx);

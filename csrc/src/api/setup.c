@@ -1,4 +1,5 @@
-/* A context in its workspace: where each part's arrays lie, and what is learned of the model. */
+/* Set up a context in its workspace: lay out the arrays of each part, and learn the constants of
+ * the model. */
 #include "context/context.h"
 
 #include "base/vec.h"
@@ -20,8 +21,8 @@ size_t eits_workspace_size(const eits_model *model, int prepared)
                                (size_t)model->nx * model->ny, prepared);
 }
 
-/* The next part of the workspace. Cleared, so that no result depends on what was in the caller's
- * memory before. */
+/* Take the next part of the workspace and clear it, so that no result depends on the earlier
+ * content of the caller's memory. */
 static void *take(uint8_t **next, size_t bytes)
 {
     uint8_t *taken = *next;
@@ -30,7 +31,7 @@ static void *take(uint8_t **next, size_t bytes)
     return taken;
 }
 
-/* By the list that EITS_WORKSPACE_SIZE adds up (eitskin/sizes.h). */
+/* The list of arrays is the one that EITS_WORKSPACE_SIZE adds up (eitskin/sizes.h). */
 #define TAKE(place, element, count)                                                          \
     _Static_assert(sizeof *((eits_context *)NULL)->place == sizeof(element), "its element"); \
     ctx->place = take(next, (size_t)(count) * sizeof(element));
@@ -41,7 +42,8 @@ static void lay_out(eits_context *ctx, uint8_t **next)
     EITS_WORKSPACE_ARRAYS(TAKE, m->n_rows, m->n_folded, m->rank, m->n_pixels, (size_t)m->nx * m->ny)
 }
 
-/* From a line of the processor's cache on, so that no vector of theirs lies across two. */
+/* Panels begin at a line of the processor's cache, so that none of their vectors lies across two
+ * lines. */
 static void lay_out_panels(eits_context *ctx, uint8_t **next)
 {
     const eits_model *m = ctx->model;
@@ -50,8 +52,8 @@ static void lay_out_panels(eits_context *ctx, uint8_t **next)
     eits_make_panels(&m->sensitivity, ctx->columns.panels);
 }
 
-/* Vectors of the solvers and the whitening that lie in other arrays. Scratch rows 5 to 7 stay free
- * for what one solver alone needs (solve/active_set.c). */
+/* Place some vectors of the solvers and the whitening in other arrays. Scratch rows 5 to 7 stay
+ * free for a solver's own vectors (solve/active_set.c). */
 static void lend(eits_context *ctx)
 {
     const eits_scratch *from = &ctx->scratch;
@@ -69,8 +71,8 @@ static void lend(eits_context *ctx)
     ctx->whitening.metric = ctx->whitening.map + EITS_PADDED_TRIANGLE(ctx->model->rank);
 }
 
-/* From a cell of the image to its kept pixel: without this map each look at a pixel's neighbours
- * would search all pixels. There are at most 65535 of them, so 16 bits hold each number and one
+/* Map each cell of the image to its kept pixel: without this map each look at a pixel's neighbours
+ * would search all pixels. There are at most 65535 pixels, so 16 bits hold each number and one
  * value is left for "none". */
 static void map_cells(const eits_model *model, uint16_t *cell)
 {
@@ -100,26 +102,28 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
     lend(made);
     map_cells(model, made->cell);
     eits_clear_column_cache(&made->columns);
-    /* 1 and not 0: a model without row gains multiplies by these as well, to the same bits */
+    /* 1 and not 0: a model without row gains multiplies by these numbers too, which leaves the bits
+     * unchanged */
     for (uint32_t i = 0; i < model->n_rows; ++i)
         made->reference.row_gain[i] = 1;
-    /* By the memory that there is, not by a flag: the caller has decided with the size. */
+    /* The size of the memory decides and not a flag: the caller chose by giving that size. */
     if (size >= eits_workspace_size(model, 1))
         lay_out_panels(made, &next);
     eits_learn_range(made);
     eits_whitening_init(made, &made->scratch);
-    /* Learned from the model above, once: it does not change. */
+    /* The above is learned from the model once, since the model does not change. */
     (void)eits_options_default(model, &made->options);
-    /* The context is given also where the arithmetic fails: eits_self_test then says by how much.
-     */
+    /* The context is returned even if the arithmetic fails: eits_self_test then reports the
+     * deviation. */
     *ctx = made;
     eits_real left[EITS_ARITHMETIC_TRIALS];
     eits_try_arithmetic(left);
     return eits_judge_arithmetic(left);
 }
 
-/* What was found with other options may not hold any more: coefficients of another sign are no
- * start, and the directions to ignore depend on these two. */
+/* Results found with other options may not hold any more: coefficients of another sign are not a
+ * valid start, and the basis and the whitening depend on project_reference and
+ * regularisation_noise_factor. */
 eits_status eits_set_options(eits_context *ctx, const eits_options *o)
 {
     if (ctx == NULL || o == NULL || !eits_options_in_range(o))
@@ -129,7 +133,7 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
     if (o->project_reference != ctx->options.project_reference ||
         o->regularisation_noise_factor != ctx->options.regularisation_noise_factor)
         ctx->projection.stale = 1;
-    /* The gains were learned from the reference, which is still here: no new tare is needed. */
+    /* Gains are learned from the reference, which the context still has: no new tare is needed. */
     const int row_gains = o->row_gains != ctx->options.row_gains;
     ctx->options = *o;
     if (row_gains && ctx->reference.ready)
@@ -137,7 +141,7 @@ eits_status eits_set_options(eits_context *ctx, const eits_options *o)
     return EITS_OK;
 }
 
-/* For tests that compare two builds of the kernels on one machine: the bits are the same. */
+/* Tests use this to compare two builds of the kernels on one machine: the bits are the same. */
 eits_status eits_use_portable_kernels(eits_context *ctx, int portable)
 {
     if (ctx == NULL)
@@ -150,7 +154,7 @@ void eits_forget(eits_context *ctx)
 {
     if (ctx == NULL)
         return;
-    /* ids count on: one that a host has seen never names another finger */
+    /* ids go on counting: an id that a host has seen never names another finger */
     ctx->solver.warm = 0;
     ctx->tracker.count = 0;
     eits_reference_tracking_break(ctx);

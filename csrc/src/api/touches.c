@@ -1,9 +1,10 @@
-/* From the image to touches: fitted, pruned, followed, weighed; and perhaps a second pass.
+/* Find touches in the image: they are fitted, pruned and tracked, and their force is computed; a
+ * second pass may follow.
  *
- * Order matters: the crowd is checked on what this frame shows, before tracking hides tentative
- * touches and adds held ones; force is computed after it, from the smoothed strength and place. The
- * second pass solves the image again for data without the touches' interaction; the touches are
- * those of the first, so nothing goes round in a circle. */
+ * The order matters. Crowding is checked on this frame's touches, before tracking hides tentative
+ * touches and adds held ones. Force is computed after tracking, from the smoothed strength and
+ * place. The second pass solves the image again for data without the touches' interaction; the
+ * touches stay those of the first pass, so that the two do not iterate. */
 #include "eitskin/force.h"
 #include "eitskin/touch.h"
 
@@ -16,7 +17,7 @@
 #include "touch/disc.h"
 #include "touch/disc_fit.h"
 
-/* Whether the image says that there may be touches. */
+/* Returns 1 if the image may have touches. */
 static int may_have_touches(const eits_context *ctx)
 {
     const eits_stop stop = ctx->info.stop;
@@ -32,8 +33,8 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     const eits_scratch *scratch = &ctx->scratch;
     eits_fit f = eits_fit_none(ctx, scratch);
     eits_touch found[EITS_MAX_TOUCHES];
-    /* An image that is zero for the reason given by info.stop has no touches; those that were
-     * followed are then held or given up like any that are not found. */
+    /* An image that is zero for the reason given by info.stop has no touches. Tracked touches are
+     * then held or dropped like any that are not found. */
     ctx->info.unexplained = 0;
     if (may_have_touches(ctx)) {
         eits_fit_touches(ctx, scratch, &f);
@@ -55,10 +56,11 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     ctx->info.touch_macs = f.macs;
     eits_check_crowd(ctx, found, finite);
     eits_check_count(ctx, &f);
-    /* Judged by what this frame shows; tracking may hide some of it and add others. */
+    /* The checks above use this frame's touches; tracking may hide some of them and add others. */
     const uint32_t next_id = ctx->tracker.next_id;
     const uint32_t reported = eits_track(ctx, found, finite);
-    if (ctx->tracker.next_id != next_id) /* as many as before may be others */
+    if (ctx->tracker.next_id != next_id) /* a track started, so these may be other touches even if
+                                            their number is the same */
         eits_reference_tracking_break(ctx);
     ctx->info.touches = reported;
     for (uint32_t k = 0; k < reported; ++k) {
@@ -66,7 +68,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         found[k].force_n =
             eits_force_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
     }
-    /* Last, since it overwrites image, info and scratch. */
+    /* The second pass comes last, since it overwrites image, info and scratch. */
     if (ctx->options.second_pass && ctx->options.mac_limit == 0 && f.count > 1 &&
         f.data == ctx->touch.y_separate)
         eits_solve_again(ctx, scratch, ctx->touch.y_separate);
@@ -77,7 +79,8 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     const uint32_t followed = (ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0
                                   ? EITS_TOUCHES_UNKNOWN
                                   : ctx->tracker.count;
-    /* Coefficients of another reference are no start. */
+    /* If the reference moved, the coefficients belong to another reference and are not a valid
+     * start. */
     if (eits_reference_tracking_end(ctx, scratch, found, reported, followed, &ctx->info.touch_macs))
         ctx->solver.warm = 0;
     return EITS_OK;

@@ -10,14 +10,14 @@
 #define LEAST 0x1p-126
 #endif
 
-/* Sums that any other arithmetic than plain IEEE gives another result for. (1 + e)^2 - (1 + 2
- * e) is 0 where the product is rounded before the sum, since e^2 is below half a bit of 1, and e^2
- * where both are one operation (contraction to a fused multiply-add). (large + 1) - large is 0
- * where the sum is rounded first, and 1 where a compiler may change the order of sums. 1 and 3/4 of
- * its unit make 1 and a unit where rounding is to nearest or up; a product that goes up is left by
- * the first. Half the least normal number is 0 where a processor flushes subnormals.
+/* Each of these sums is 0 in plain IEEE arithmetic and another number in any other arithmetic. (1 +
+ * e)^2 - (1 + 2e) is 0 if the product is rounded before the sum, since e^2 is below half a bit of
+ * 1, and e^2 if the compiler contracts both into a fused multiply-add. (large + 1) - large is 0 if
+ * the first sum is rounded first, and 1 if the compiler changes the order of sums. 1 + 3/4 unit
+ * gives 1 + unit if sums are rounded to nearest or up; the first sum shows a product that is
+ * rounded up. Half the least normal number is 0 if the processor flushes subnormal numbers.
  *
- * Volatile, so that the operations are done by the program and not by the compiler. */
+ * The numbers are volatile, so that the program and not the compiler computes the sums. */
 void eits_try_arithmetic(eits_real left[EITS_ARITHMETIC_TRIALS])
 {
     volatile eits_real tiny = (eits_real)TINY, one = 1, last = (eits_real)UNIT,

@@ -1,6 +1,6 @@
-/* The arithmetic that the bits of every result rest on: each operation rounded once, to eits_real,
- * in the order written. What a compiler says of its flags is checked here; contraction and
- * re-association it does not say, so eits_init tries them. */
+/* The bits of every result rest on this arithmetic: each operation is rounded once, to eits_real,
+ * in the order written. The preprocessor checks the flags that a compiler reports. Contraction and
+ * re-association are not among them, so eits_init tries them. */
 #ifndef EITSKIN_ARITHMETIC_H
 #define EITSKIN_ARITHMETIC_H
 
@@ -16,16 +16,16 @@
 #endif
 #endif
 
-/* Trials, in this order: contraction, another order of sums, another rounding
- * than to nearest, subnormal numbers taken for zero. */
+/* The trials, in this order: contraction, a changed order of sums, a rounding mode other than to
+ * nearest, and subnormal numbers flushed to zero. */
 enum { EITS_ARITHMETIC_TRIALS = 4 };
 
-/* Each computed as the core was compiled, and 0 where arithmetic is as written: what is left of
- * (1 + e)^2 - (1 + 2e) with e^2 below half a unit in the last place; of (1/e^2 + 1) - 1/e^2; of
- * 1 + 3/4 unit - (1 + unit); of twice half the least normal number, less that number. */
+/* Compute the trials with the core's compiler flags. Each is 0 if the arithmetic is plain IEEE: (1
+ * + e)^2 - (1 + 2e) with e^2 below half a unit in the last place; (1/e^2 + 1) - 1/e^2; 1 + 3/4 unit
+ * - (1 + unit); twice half the least normal number, less that number. */
 void eits_try_arithmetic(eits_real left[EITS_ARITHMETIC_TRIALS]);
 
-/* EITS_E_ARITHMETIC where one is not 0. */
+/* Returns EITS_E_ARITHMETIC if one of them is not 0. */
 eits_status eits_judge_arithmetic(const eits_real left[EITS_ARITHMETIC_TRIALS]);
 
 #endif

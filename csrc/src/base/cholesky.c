@@ -1,6 +1,6 @@
 #include "base/cholesky.h"
 
-/* value less the sum of a_k b_k over k < count. */
+/* Returns value minus the sum of a_k b_k over k < count. */
 static eits_real less_dot(eits_real value, const eits_real *a, const eits_real *b, uint32_t count)
 {
     for (uint32_t k = 0; k < count; ++k)

@@ -2,8 +2,8 @@
  *
  * Triangles are packed by rows: row i has i + 1 numbers and follows row i - 1, so n rows take
  * EITS_LOWER_SIZE(n) numbers. Each sum is one chain of fused multiply-adds by ascending column:
- * with the few rows that there are here, lanes of eight would be padding for the most part. The
- * large triangles, of as many rows as the model has directions, are in context/triangle.h. */
+ * these matrices have few rows, so lanes of eight would mostly be padding. The large triangles,
+ * with one row per direction of the model, are in context/triangle.h. */
 #ifndef EITSKIN_CHOLESKY_H
 #define EITSKIN_CHOLESKY_H
 
@@ -17,13 +17,14 @@ static inline eits_real *eits_lower_row(eits_real *lower, uint32_t i)
     return lower + EITS_LOWER_SIZE(i);
 }
 
-/* The next row of the factor. Rows before row i are L's already, row i is still A's. Makes L_ij of
- * each j < i and returns the pivot, that is A_ii less the squares of these. The caller decides what
- * to do with a pivot that is too small, and then stores its square root as L_ii: what "too small"
- * means depends on what the matrix is. */
+/* Compute the next row of the factor. The rows before row i are L's already; row i is still A's.
+ * Computes L_ij for each j < i and returns the pivot, that is A_ii minus the squares of these. The
+ * caller decides whether the pivot is too small, which depends on the matrix, and then stores its
+ * square root as L_ii. */
 eits_real eits_cholesky_row(eits_real *lower, uint32_t i);
 
-/* v = L^-1 v, then v = L'^-1 v, of n rows: after both, v is A^-1 v. */
+/* The first function sets v = L^-1 v, the second v = L'^-1 v, with n rows: after both, v is A^-1 v.
+ */
 void eits_lower_solve(eits_real *lower, uint32_t n, eits_real *v);
 void eits_lower_solve_transposed(eits_real *lower, uint32_t n, eits_real *v);
 

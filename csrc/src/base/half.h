@@ -1,5 +1,5 @@
-/* IEEE 754 half precision to float, exactly; subnormals too. Infinities and NaN are refused when a
- * model is opened. */
+/* Convert IEEE 754 half precision to float, exactly and including subnormal numbers. Infinities and
+ * NaN do not occur: eits_model_open rejects them. */
 #ifndef EITSKIN_HALF_H
 #define EITSKIN_HALF_H
 
@@ -11,7 +11,8 @@
 static inline float eits_half_to_float(uint16_t half)
 {
 #if defined(__ARM_ARCH_7EM__) && defined(__ARM_FP)
-    /* both FPUs of that architecture convert halves, though GCC does not know it of fpv5-sp-d16 */
+    /* both FPUs of that architecture convert halves, though GCC does not know this for fpv5-sp-d16
+     */
     float value;
     __asm__("vmov %0, %1\n\tvcvtb.f32.f16 %0, %0" : "=t"(value) : "r"((uint32_t)half));
     return value;
@@ -31,7 +32,7 @@ static inline float eits_half_to_float(uint16_t half)
 #endif
 }
 
-/* Two neighbours by one load. */
+/* Convert two neighbouring numbers, which takes one load. */
 static inline void eits_halves_to_floats(const uint16_t *halves, float value[2])
 {
 #if defined(__ARM_ARCH_7EM__) && defined(__ARM_FP)

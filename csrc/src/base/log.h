@@ -1,12 +1,12 @@
-/* Natural logarithm by basic operations only, so that its bits do not depend on a C library. */
+/* The natural logarithm by basic operations only, so that its bits do not depend on a C library. */
 #ifndef EITSKIN_LOG_H
 #define EITSKIN_LOG_H
 
 #include "base/vec.h"
 
-/* log(q) for finite q > 0 that is no subnormal. q = 2^k f, f in [sqrt(1/2), sqrt 2), log f = 2
- * atanh(s), s = (f-1)/(f+1), |s| < 0.172, by the series of atanh up to s^11 (float: 6 terms) or
- * s^23 (double: 12 terms), truncated below one unit in the last place. */
+/* Returns log(q) for a finite q > 0 that is not subnormal. With q = 2^k f, f in [sqrt(1/2), sqrt 2)
+ * and s = (f-1)/(f+1), |s| < 0.172, log f = 2 atanh(s), by the series of atanh up to s^11 (float: 6
+ * terms) or s^23 (double: 12 terms), truncated below one unit in the last place. */
 static inline eits_real eits_log(eits_real q)
 {
     int k = 0;

@@ -1,6 +1,6 @@
 #include "eitskin/types.h"
 
-/* A switch without a default: a compiler names the case that a new status lacks. */
+/* The switch has no default, so that the compiler reports a new status that has no case. */
 const char *eits_status_text(eits_status status)
 {
     switch (status) {
@@ -26,8 +26,8 @@ const char *eits_status_text(eits_status status)
         return "the model does not start at a 16-byte boundary";
     case EITS_E_FRAME_LENGTH:
         return "the frame's length is not the number of rows of the protocol";
-    case EITS_E_FRAME_CHANNELS:
-        return "too many channels of the frame are unusable";
+    case EITS_E_FRAME_ROWS:
+        return "too many rows of the frame are unusable";
     case EITS_E_FRAME_ZERO:
         return "all voltages are zero; is the skin driven and connected?";
     case EITS_E_NO_REFERENCE:
@@ -43,7 +43,7 @@ const char *eits_status_text(eits_status status)
     return "unknown status";
 }
 
-/* Two macros, so that the number is put in before it becomes text. */
+/* Two macros are needed, so that the number is put in before it becomes text. */
 #define TEXT_OF(x) #x
 #define TEXT(x)    TEXT_OF(x)
 

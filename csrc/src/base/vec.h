@@ -33,7 +33,7 @@ static inline void eits_zero(eits_real *out, size_t count)
 
 static inline void eits_copy(eits_real *out, const eits_real *a, size_t count)
 {
-    memmove(out, a, count * sizeof *out); /* may be the same place */
+    memmove(out, a, count * sizeof *out); /* memmove, since `out` may be `a` */
 }
 
 static inline eits_real eits_larger(eits_real a, eits_real b)
@@ -46,7 +46,8 @@ static inline eits_real eits_clamp(eits_real v, eits_real low, eits_real high)
     return v < low ? low : (v > high ? high : v);
 }
 
-/* Finite by its exponent's bits, so that no compiler flag can take the test away. */
+/* Returns 1 if the value is finite. It tests the exponent's bits, so that no compiler flag can
+ * remove the test. */
 static inline int eits_is_finite(eits_real value)
 {
 #ifdef EITS_DOUBLE
@@ -60,7 +61,7 @@ static inline int eits_is_finite(eits_real value)
 #endif
 }
 
-/* 1 where each of the values is finite. */
+/* Returns 1 if each of the values is finite. */
 static inline int eits_all_finite(const eits_real *values, size_t count)
 {
     int all = 1;

@@ -1,7 +1,7 @@
 /* The parts of a context, for use inside the library.
  *
  * Each part belongs to one module (a folder of csrc/src). Once it is laid out, only that module
- * writes it, and the modules above read it. tests/python/core/test_rooms.py checks this, and that
+ * writes it, and the modules above read it. tests/python/core/test_modules.py checks this, and that
  * no module includes one above it. All memory comes from the caller's workspace and is laid out
  * once, by api/setup.c. "stride" is EITS_STRIDE(rank): rank, rounded up to whole vectors of the
  * kernels. */

@@ -14,7 +14,7 @@
 #include "base/vec.h"
 #include "evidence/constants.h"
 
-/* As many shapes as there is room for; what is at hand is then of another answer. */
+/* As many shapes as there is room for; what is stored then belongs to another answer. */
 static void add_shapes(const eits_context *ctx, eits_answer *answer, eits_likelihood *likelihood)
 {
     const uint32_t parameters = eits_shape_parameters(ctx, answer->count);

@@ -99,7 +99,7 @@ uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, eits_a
 
 /* Gauss and Newton's steps, a few at most, until F is `enough` or hardly falls, or a linearisation
  * says that it will not come below `hopeless`; sets
- * answer->misfit. `likelihood` is made unless it is at hand; afterwards it is, or it may be made.
+ * answer->misfit. `likelihood` is made unless it is available; afterwards it is, or it may be made.
  * Where not even the first may be, the misfit is beyond all others. */
 uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer *answer,
                     eits_likelihood *likelihood, eits_real enough, eits_real hopeless);

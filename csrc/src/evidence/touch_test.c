@@ -122,7 +122,7 @@ static int take_split(eits_context *ctx, const eits_scratch *scratch, eits_verdi
 }
 
 /* Split what is likelier two, the likeliest first. The covariance is made once more: another
- * hypothesis's may be at hand. */
+ * hypothesis's may be available. */
 static void split(eits_context *ctx, const eits_scratch *scratch, const eits_fit *f,
                   eits_verdict *v, uint64_t *macs)
 {

@@ -55,7 +55,7 @@ int eits_any_may_be_one(const eits_verdict *v, eits_real needed);
 
 /* elimination.c */
 
-/* From the discs as they are to those that stay, under the covariance at hand; not `to_the_end`: 0
+/* From the discs as they are to those that stay, under the present covariance; not `to_the_end`: 0
  * as soon as the data are found not to fit, to be gone on with another time, and where no column
  * may be made at all. Where no more may be made, what stands then stays. */
 int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict *v,

@@ -1,4 +1,4 @@
-/* What the parts of this room share. */
+/* What the parts of this module share. */
 #ifndef EITSKIN_FAST_ROOM_H
 #define EITSKIN_FAST_ROOM_H
 
@@ -217,7 +217,7 @@ int eits_fast_fit_at(eits_fast *fast, uint32_t from, uint32_t known, fast_fit *f
 /* The newest drive says what it does at the places that the last search came to. */
 void eits_fast_keep_up(eits_fast *fast);
 /* Looks for one touch in them, or by the map beside it for a second at `first`; the best, with its
- * lead over the next best elsewhere; NULL where there is none. It is the room's until the next
+ * lead over the next best elsewhere; NULL where there is none. Owned by this module until the next
  * search. */
 const fast_fit *eits_fast_find(eits_fast *fast, uint32_t from, const eits_real *first,
                                eits_real *lead);

@@ -32,7 +32,7 @@ eits_status eits_check_reference_frame(const eits_context *ctx, const eits_real 
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         if (!ctx->rows.masked[i] &&
             (!eits_is_finite(frame[i]) || (limit > 0 && eits_fabs(frame[i]) >= limit)))
-            return EITS_E_FRAME_CHANNELS;
+            return EITS_E_FRAME_ROWS;
     }
     return EITS_OK;
 }

@@ -6,7 +6,7 @@
 #include "context/context.h"
 
 /* Whether each row that is not masked has a finite voltage below saturation.
- * Errors: EITS_E_FRAME_LENGTH, EITS_E_FRAME_CHANNELS. */
+ * Errors: EITS_E_FRAME_LENGTH, EITS_E_FRAME_ROWS. */
 eits_status eits_check_reference_frame(const eits_context *ctx, const eits_real *frame,
                                        size_t length);
 

@@ -16,14 +16,14 @@
  * A touch below the detection threshold can thus move the reference by at most a sixteenth of the
  * threshold before it is detected. A touch that grows by less than about half the threshold in 2.4
  * N frames is below the noise of each mean, and the reference follows it like drift: it cannot be
- * told from a skin that dries in one place.
+ * distinguished from a skin that dries in one place.
  *
  * Under touches the reference keeps its pattern, for however long. Only its size follows, and only
  * after the same number of touches has been there for N / 4 frames. Of each mean this takes the
  * part along the reference that no touch can explain, u'y / u'u, where u is the reduced reference
  * without its parts along the touches' columns, and holds it where the first mean had it. So an
  * even sheet that dries under a resting hand changes its force by little. Uneven drying cannot be
- * told from the hand.
+ * distinguished from the hand.
  *
  * A reference that has moved is fitted to the model again, as a tare is: gain and row gains are
  * found again, the noise stays. */

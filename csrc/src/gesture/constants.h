@@ -96,9 +96,11 @@
  * missed; smaller: fingers that rest wobble */
 #define EITS_PAIR_MM R(15.0)
 
-/* ---- Chosen: by hand; not measured. Check: ctest --preset host -R gesture */
+/* ---- Chosen: by hand, a matter of taste: MOVE_MM and ZONE_STAY_MM say how finely a finger is
+ * reported. The others are guards; none changes a gesture at half and at double (study constants).
+ * Check: ctest --preset host -R gesture */
 
-/* least step that a MOVE or a CHANGE tells [mm]. larger: coarse; smaller: noise is reported */
+/* least step that a MOVE or a CHANGE reports [mm]. larger: coarse; smaller: noise is reported */
 #define EITS_MOVE_MM R(1.0)
 
 /* a touch further away is no touch [mm]. larger: squares overflow; smaller: large skins */

@@ -13,9 +13,9 @@ enum { CONTACT_NONE = 0, CONTACT_NEW = 1, CONTACT_DOWN = 2, CONTACT_LIFTED = 3 }
 enum {
     CONTACT_SEEN = 1,     /* in this frame */
     CONTACT_WITH = 2,     /* another finger was down beside it: no gesture of one finger */
-    CONTACT_DONE = 4,     /* its hold or swipe was told */
-    CONTACT_TAPPED = 8,   /* its tap was told, before it was found again */
-    CONTACT_DUBIOUS = 16, /* it must last doubt_us to be told */
+    CONTACT_DONE = 4,     /* its hold or swipe was reported */
+    CONTACT_TAPPED = 8,   /* its tap was reported, before it was found again */
+    CONTACT_DUBIOUS = 16, /* it must last doubt_us to be reported */
     CONTACT_GOING = 32,   /* it was letting go when it was last found */
     CONTACT_RENAMED = 64  /* in this frame it took another touch's place */
 };
@@ -26,7 +26,7 @@ typedef struct event_list {
     uint32_t room, count, *dropped;
 } event_list;
 
-static inline void eits_tell(event_list *out, eits_event event)
+static inline void eits_report(event_list *out, eits_event event)
 {
     if (out->count < out->room)
         out->events[out->count++] = event;

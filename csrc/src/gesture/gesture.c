@@ -7,9 +7,9 @@
 #include "gesture/plane.h"
 #include "gesture/two_fingers.h"
 
-enum { NOBODY = EITS_MAX_CONTACTS };
+enum { NO_CONTACT = EITS_MAX_CONTACTS };
 
-eits_status eits_gestures_usual(eits_gesture_options *options)
+eits_status eits_gestures_default(eits_gesture_options *options)
 {
     if (options == NULL)
         return EITS_E_ARGUMENT;
@@ -42,7 +42,7 @@ eits_status eits_gestures_init(eits_gestures *gestures, const eits_gesture_optio
     eits_gesture_options chosen;
     if (gestures == NULL)
         return EITS_E_ARGUMENT;
-    (void)eits_gestures_usual(&chosen);
+    (void)eits_gestures_default(&chosen);
     if (options != NULL)
         chosen = *options;
     const eits_real reals[] = {chosen.rejoin_mm, chosen.move_mm,  chosen.still_mm,
@@ -66,7 +66,7 @@ eits_status eits_gestures_init(eits_gestures *gestures, const eits_gesture_optio
  *
  * One that lifted may come back for rejoin_us, but only by a touch that was found: the tracker
  * holds touches by itself, and one that it holds shows nothing. */
-static int waits(const eits_gestures *g, const eits_contact *c, const eits_touch *touch)
+static int can_match(const eits_gestures *g, const eits_contact *c, const eits_touch *touch)
 {
     if ((c->flags & CONTACT_SEEN) != 0 || c->state == CONTACT_NONE)
         return 0;
@@ -74,27 +74,27 @@ static int waits(const eits_gestures *g, const eits_contact *c, const eits_touch
            (touch->explained > 0 && g->time_us - c->seen_us <= g->options.rejoin_us);
 }
 
-/* The tracker's own word comes first: the contact that had this id, or NOBODY. */
+/* The tracker's own word comes first: the contact that had this id, or NO_CONTACT. */
 static uint32_t of_same_id(const eits_gestures *g, const eits_touch *touch)
 {
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
-        if (g->contact[k].touch_id == touch->id && waits(g, &g->contact[k], touch))
+        if (g->contact[k].touch_id == touch->id && can_match(g, &g->contact[k], touch))
             return k;
     }
-    return NOBODY;
+    return NO_CONTACT;
 }
 
-/* The nearest contact that waits, for a touch that the tracker has given a new id. */
+/* The nearest contact that can match a touch that the tracker has given a new id. */
 static uint32_t of_same_place(const eits_gestures *g, const eits_touch *touch)
 {
     eits_real nearest = g->options.rejoin_mm;
-    uint32_t found = NOBODY;
+    uint32_t found = NO_CONTACT;
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
         const eits_contact *c = &g->contact[k];
         const eits_real apart = eits_distance(touch->x_mm - c->x_mm, touch->y_mm - c->y_mm);
         /* one that let go has lifted; only the tracker may know better */
         const int lifted = c->state == CONTACT_LIFTED && (c->flags & CONTACT_GOING) != 0;
-        if (!lifted && waits(g, c, touch) && apart <= nearest) {
+        if (!lifted && can_match(g, c, touch) && apart <= nearest) {
             nearest = apart;
             found = k;
         }
@@ -107,7 +107,7 @@ static uint32_t of_same_place(const eits_gestures *g, const eits_touch *touch)
  * Lifted ones keep their place as long as it is not needed: they may come back. */
 static uint32_t free_place(const eits_gestures *g)
 {
-    uint32_t found = NOBODY, longest_us = 0;
+    uint32_t found = NO_CONTACT, longest_us = 0;
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
         const eits_contact *c = &g->contact[k];
         if (c->state == CONTACT_NONE)
@@ -164,15 +164,15 @@ static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch
 /* An event at where the contact is now; what moves from here on is measured from there.
  *
  * Steps add up from what was reported last: a slow finger is not lost between two frames. */
-static void tell_place(const eits_gestures *g, eits_contact *c, uint32_t kind, event_list *out)
+static void report_place(const eits_gestures *g, eits_contact *c, uint32_t kind, event_list *out)
 {
-    c->told_x_mm = c->x_mm;
-    c->told_y_mm = c->y_mm;
-    eits_tell(out, (eits_event){.kind = kind,
-                                .first_id = c->id,
-                                .time_us = g->time_us,
-                                .x_mm = c->x_mm,
-                                .y_mm = c->y_mm});
+    c->reported_x_mm = c->x_mm;
+    c->reported_y_mm = c->y_mm;
+    eits_report(out, (eits_event){.kind = kind,
+                                  .first_id = c->id,
+                                  .time_us = g->time_us,
+                                  .x_mm = c->x_mm,
+                                  .y_mm = c->y_mm});
 }
 
 /* From now on others know of it.
@@ -181,7 +181,7 @@ static void tell_place(const eits_gestures *g, eits_contact *c, uint32_t kind, e
 static void land(const eits_gestures *g, eits_contact *c, event_list *out)
 {
     c->state = CONTACT_DOWN;
-    tell_place(g, c, EITS_EVENT_DOWN, out);
+    report_place(g, c, EITS_EVENT_DOWN, out);
 }
 
 /* A finger was in this frame: it goes on, or is found again after it seemed to have lifted. */
@@ -194,8 +194,9 @@ static void go_on(eits_gestures *g, eits_contact *c, const eits_touch *touch, ev
         (c->state == CONTACT_NEW && g->time_us - c->born_us >= wait_us))
         land(g, c, out);
     else if (c->state == CONTACT_DOWN &&
-             eits_distance(c->x_mm - c->told_x_mm, c->y_mm - c->told_y_mm) >= g->options.move_mm)
-        tell_place(g, c, EITS_EVENT_MOVE, out);
+             eits_distance(c->x_mm - c->reported_x_mm, c->y_mm - c->reported_y_mm) >=
+                 g->options.move_mm)
+        report_place(g, c, EITS_EVENT_MOVE, out);
 }
 
 /* Beside another that is down, or much fainter than the strongest.
@@ -218,7 +219,7 @@ static int is_doubtful(const eits_gestures *g, const eits_touch *touch)
 static void begin_contact(eits_gestures *g, const eits_touch *touch)
 {
     const uint32_t place = free_place(g);
-    if (place == NOBODY) {
+    if (place == NO_CONTACT) {
         /* counted, not replaced: to drop a finger that is down would report a lift that was none */
         ++g->dropped;
         return;
@@ -251,13 +252,13 @@ static void match(eits_gestures *g, const eits_touch *touches, uint32_t count, e
                 continue;
             const uint32_t place = round == 0   ? of_same_id(g, &touches[k])
                                    : round == 1 ? of_same_place(g, &touches[k])
-                                                : NOBODY;
-            if (place == NOBODY && round < 2)
+                                                : NO_CONTACT;
+            if (place == NO_CONTACT && round < 2)
                 continue;
             passed[k] = 1;
-            if (place == NOBODY && touches[k].explained > 0)
+            if (place == NO_CONTACT && touches[k].explained > 0)
                 begin_contact(g, &touches[k]);
-            else if (place != NOBODY)
+            else if (place != NO_CONTACT)
                 go_on(g, &g->contact[place], &touches[k], out);
         }
     }
@@ -284,7 +285,7 @@ static void lift(eits_gestures *g, uint32_t place, event_list *out)
 {
     eits_contact *c = &g->contact[place];
     eits_pair_lift(g, place, out);
-    tell_place(g, c, EITS_EVENT_UP, out);
+    report_place(g, c, EITS_EVENT_UP, out);
     c->state = CONTACT_LIFTED;
 }
 
@@ -349,15 +350,15 @@ static void begin_again(eits_gestures *g, event_list *out)
 
 eits_status eits_gestures_update(eits_gestures *gestures, const eits_touch *touches, uint32_t count,
                                  uint32_t time_us, eits_event *events, uint32_t room,
-                                 uint32_t *told)
+                                 uint32_t *reported)
 {
     eits_gestures *g = gestures;
-    if (g == NULL || told == NULL || count > EITS_MAX_TOUCHES || (touches == NULL && count > 0) ||
-        (events == NULL && room > 0))
+    if (g == NULL || reported == NULL || count > EITS_MAX_TOUCHES ||
+        (touches == NULL && count > 0) || (events == NULL && room > 0))
         return EITS_E_ARGUMENT;
     event_list out = {.events = events, .room = room, .dropped = &g->dropped};
     const uint32_t elapsed_us = time_us - g->time_us;
-    *told = 0;
+    *reported = 0;
     /* The same frame twice says nothing new. A clock that goes back is a long gap, as unsigned
      * numbers have it, and so is treated as one. */
     if (g->begun && elapsed_us == 0)
@@ -373,6 +374,6 @@ eits_status eits_gestures_update(eits_gestures *gestures, const eits_touch *touc
     end_lost(g, &out);
     eits_pair_step(g, &out);
     eits_hold(g, &out);
-    *told = out.count;
+    *reported = out.count;
     return EITS_OK;
 }

@@ -21,7 +21,7 @@ static void tap(eits_gestures *g, eits_contact *c, event_list *out)
     const int again = g->tapped && c->born_us - g->tap_us <= g->options.double_us &&
                       eits_distance(c->start_x_mm - g->tap_x_mm, c->start_y_mm - g->tap_y_mm) <=
                           g->options.double_mm;
-    eits_tell(out, event_at(g, c, again ? EITS_EVENT_DOUBLE_TAP : EITS_EVENT_TAP));
+    eits_report(out, event_at(g, c, again ? EITS_EVENT_DOUBLE_TAP : EITS_EVENT_TAP));
     c->flags |= CONTACT_TAPPED;
     g->tapped = !again; /* a third tap is a first one */
     g->tap_us = c->seen_us;
@@ -51,12 +51,12 @@ static eits_real last_speed(const eits_gestures *g, const eits_contact *c)
            ((eits_real)span_us * R(1e-6));
 }
 
-/* Tell a swipe if a way so long, at such a speed, is one. */
+/* Report a swipe if the way is long and fast enough for one. */
 static int is_swipe(const eits_gestures *g, eits_contact *c, eits_real dx, eits_real dy,
                     eits_real speed, event_list *out)
 {
     const eits_real length = eits_distance(dx, dy), angle = eits_angle_deg(dy, dx);
-    /* it has gone on for settle_us before it was told */
+    /* it has gone on for settle_us before it was reported */
     const eits_real before = speed * (eits_real)g->options.settle_us * R(1e-6);
     if (length + before < g->options.swipe_mm || speed < g->options.swipe_mm_per_s ||
         length < EITS_SWIPE_STRAIGHT * c->farthest_mm)
@@ -65,7 +65,7 @@ static int is_swipe(const eits_gestures *g, eits_contact *c, eits_real dx, eits_
     event.direction_deg = angle < 0 ? angle + 360 : angle;
     event.value = length;
     c->flags |= CONTACT_DONE;
-    eits_tell(out, event);
+    eits_report(out, event);
     return 1;
 }
 
@@ -122,6 +122,6 @@ void eits_hold(eits_gestures *g, event_list *out)
         c->flags |= CONTACT_DONE;
         eits_event event = event_at(g, c, EITS_EVENT_HOLD);
         event.value = (eits_real)(g->time_us - c->born_us) * R(1e-6);
-        eits_tell(out, event);
+        eits_report(out, event);
     }
 }

@@ -22,20 +22,20 @@ static eits_real distance(eits_real dx_mm, eits_real dy_mm)
 
 /* The value is that of the last frame in which both were seen, also at the end: by then one of them
  * lifts, and its place is worth nothing. */
-static void tell_pair(const eits_gestures *g, uint32_t phase, event_list *out)
+static void report_pair(const eits_gestures *g, uint32_t phase, event_list *out)
 {
     const eits_finger_pair *p = &g->pair;
     const eits_contact *first = &g->contact[p->first], *second = &g->contact[p->second];
     const eits_real apart = distance(p->dx_mm, p->dy_mm);
-    eits_tell(out, (eits_event){.kind = p->kind,
-                                .phase = phase,
-                                .first_id = p->first_id,
-                                .second_id = p->second_id,
-                                .time_us = g->time_us,
-                                .x_mm = (first->x_mm + second->x_mm) * R(0.5),
-                                .y_mm = (first->y_mm + second->y_mm) * R(0.5),
-                                .value = p->kind == EITS_EVENT_ROTATE ? p->turned_deg
-                                                                      : apart / p->base_mm});
+    eits_report(out, (eits_event){.kind = p->kind,
+                                  .phase = phase,
+                                  .first_id = p->first_id,
+                                  .second_id = p->second_id,
+                                  .time_us = g->time_us,
+                                  .x_mm = (first->x_mm + second->x_mm) * R(0.5),
+                                  .y_mm = (first->y_mm + second->y_mm) * R(0.5),
+                                  .value = p->kind == EITS_EVENT_ROTATE ? p->turned_deg
+                                                                        : apart / p->base_mm});
 }
 
 /* Two fingers and no third: they may begin something.
@@ -73,9 +73,9 @@ static void begin_kind(eits_gestures *g, uint32_t kind, eits_real apart_mm, even
 {
     eits_finger_pair *p = &g->pair;
     p->kind = kind;
-    p->extreme_mm = p->told_mm = apart_mm;
-    p->told_deg = p->turned_deg;
-    tell_pair(g, EITS_PHASE_BEGIN, out);
+    p->extreme_mm = p->reported_mm = apart_mm;
+    p->reported_deg = p->turned_deg;
+    report_pair(g, EITS_PHASE_BEGIN, out);
 }
 
 /* The way that one finger went about the other, mm, for so many degrees. */
@@ -108,20 +108,20 @@ static void go_on(eits_gestures *g, eits_real apart_mm, event_list *out)
      * one */
     const eits_real back = pinch ? apart_mm - p->extreme_mm : p->extreme_mm - apart_mm;
     if (!rotate && back >= g->options.pair_mm) {
-        tell_pair(g, EITS_PHASE_END, out);
+        report_pair(g, EITS_PHASE_END, out);
         /* the new gesture's value begins at 1 where it turned round */
         p->base_mm = p->extreme_mm;
         begin_kind(g, pinch ? EITS_EVENT_SPREAD : EITS_EVENT_PINCH, apart_mm, out);
         return;
     }
     p->extreme_mm = back < 0 ? apart_mm : p->extreme_mm;
-    const eits_real moved = rotate ? way_round(p->turned_deg - p->told_deg, apart_mm)
-                                   : eits_fabs(apart_mm - p->told_mm);
+    const eits_real moved = rotate ? way_round(p->turned_deg - p->reported_deg, apart_mm)
+                                   : eits_fabs(apart_mm - p->reported_mm);
     if (moved < g->options.move_mm)
         return;
-    p->told_mm = apart_mm;
-    p->told_deg = p->turned_deg;
-    tell_pair(g, EITS_PHASE_CHANGE, out);
+    p->reported_mm = apart_mm;
+    p->reported_deg = p->turned_deg;
+    report_pair(g, EITS_PHASE_CHANGE, out);
 }
 
 /* A finger was lost for a frame and found again: they go on. */
@@ -167,6 +167,6 @@ void eits_pair_lift(eits_gestures *g, uint32_t place, event_list *out)
     if (!p->on || (place != p->first && place != p->second))
         return;
     if (p->kind != 0)
-        tell_pair(g, EITS_PHASE_END, out);
+        report_pair(g, EITS_PHASE_END, out);
     p->on = 0;
 }

@@ -114,8 +114,8 @@ static uint32_t finger_of(eits_zones *zones, uint32_t id)
 
 /* An event of a zone is the finger's own event with the zone's name. On a ring it says where as
  * well, as part of a turn counterclockwise from x, for dials. */
-static void tell_zone(const eits_zones *zones, const eits_event *cause, uint32_t kind,
-                      uint32_t phase, uint32_t zone, event_list *out)
+static void report_zone(const eits_zones *zones, const eits_event *cause, uint32_t kind,
+                        uint32_t phase, uint32_t zone, event_list *out)
 {
     eits_event event = *cause;
     const eits_zone *z = &zones->zone[zone - 1];
@@ -127,7 +127,7 @@ static void tell_zone(const eits_zones *zones, const eits_event *cause, uint32_t
         const eits_real turn = eits_angle_deg(event.y_mm - z->y_mm, event.x_mm - z->x_mm);
         event.value = (turn < 0 ? turn + 360 : turn) / 360;
     }
-    eits_tell(out, event);
+    eits_report(out, event);
 }
 
 /* A finger has left: the zone is released, or is another's that is in it. */
@@ -143,7 +143,7 @@ static void leave(eits_zones *zones, uint32_t place, const eits_event *cause, ev
             zones->presser[zone - 1] = zones->finger[k].id;
     }
     if (zones->presser[zone - 1] == 0)
-        tell_zone(zones, cause, EITS_EVENT_RELEASE, EITS_PHASE_ONCE, zone, out);
+        report_zone(zones, cause, EITS_EVENT_RELEASE, EITS_PHASE_ONCE, zone, out);
 }
 
 /* A second finger in a pressed zone presses nothing: whoever presses keys wants one event. */
@@ -154,7 +154,7 @@ static void enter(eits_zones *zones, uint32_t place, uint32_t zone, const eits_e
     if (zone == 0 || zones->presser[zone - 1] != 0)
         return;
     zones->presser[zone - 1] = zones->finger[place].id;
-    tell_zone(zones, cause, EITS_EVENT_PRESS, EITS_PHASE_BEGIN, zone, out);
+    report_zone(zones, cause, EITS_EVENT_PRESS, EITS_PHASE_BEGIN, zone, out);
 }
 
 /* Leave before enter, so that a finger that slides never holds two zones. */
@@ -173,7 +173,7 @@ static void move(eits_zones *zones, const eits_event *event, event_list *out)
         enter(zones, place, zone, event, out);
     } else if (zone != 0 && zones->presser[zone - 1] == event->first_id &&
                zones->zone[zone - 1].inner_mm > 0) {
-        tell_zone(zones, event, EITS_EVENT_PRESS, EITS_PHASE_CHANGE, zone, out);
+        report_zone(zones, event, EITS_EVENT_PRESS, EITS_PHASE_CHANGE, zone, out);
     }
 }
 
@@ -187,9 +187,10 @@ static void lift(eits_zones *zones, const eits_event *event, event_list *out)
 }
 
 eits_status eits_zones_update(eits_zones *zones, const eits_event *events, uint32_t count,
-                              eits_event *out, uint32_t room, uint32_t *told)
+                              eits_event *out, uint32_t room, uint32_t *reported)
 {
-    if (zones == NULL || told == NULL || (events == NULL && count > 0) || (out == NULL && room > 0))
+    if (zones == NULL || reported == NULL || (events == NULL && count > 0) ||
+        (out == NULL && room > 0))
         return EITS_E_ARGUMENT;
     event_list list = {.events = out, .room = room, .dropped = &zones->dropped};
     for (uint32_t k = 0; k < count; ++k) {
@@ -202,6 +203,6 @@ eits_status eits_zones_update(eits_zones *zones, const eits_event *events, uint3
         else if (event->kind == EITS_EVENT_UP)
             lift(zones, event, &list);
     }
-    *told = list.count;
+    *reported = list.count;
     return EITS_OK;
 }

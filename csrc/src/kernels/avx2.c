@@ -1,15 +1,16 @@
 /* The matrix products for x86-64 with AVX2 and FMA; this file alone is compiled with -mavx2 -mfma
  * -mf16c, and runs only where the processor has them (eits_kernels_best).
  *
- * The bits are those of the portable build. That decides the design: a chain of the specification
- * is one lane of a register, so vectors run across columns (S'v) or across rows (S x), never along
- * a sum. Where columns are stored one after the other, eight of them are transposed in registers
- * for that (avx2_stored.h); panels hold them transposed already.
+ * The results have the same bits as the portable build's. That decides the design: a chain of the
+ * specification is one lane of a register, so vectors run across columns (S'v) or across rows (S
+ * x), never along a sum. Columns that are stored one after the other are transposed in registers
+ * for that, eight at a time (avx2_stored.h); panels hold them transposed already.
  *
  * An FMA takes four to five cycles and two can start in each, so eight to ten independent sums are
- * needed to keep both units busy: hence two panels at a time.
+ * needed to keep both units busy. Two panels are therefore read at a time.
  *
- * One text serves float and double: `vector`, LANES and the macros below stand for either width. */
+ * The same source serves float and double: `vector`, LANES and the macros below stand for either
+ * width. */
 #define NAME(x) avx2_##x
 
 #include "base/vec.h"
@@ -17,8 +18,8 @@
 
 #include <immintrin.h>
 
-/* Loads that need no alignment cost nothing where the address has it, and a caller's frame may lie
- * anywhere. */
+/* Unaligned loads are used since a caller's frame may lie at any address; they cost nothing extra
+ * when the address happens to be aligned. */
 #ifdef EITS_DOUBLE
 enum { LANES = 4 };
 typedef __m256d vector;
@@ -60,8 +61,8 @@ static void avx2_sum_panel(const eits_real *panel, const eits_real *v, uint32_t 
         STORE(sum + k * LANES, lane[k]);
 }
 
-/* Eight chains hide the latency that a panel's four leave. A double panel has eight already, and
- * they fill the registers. */
+/* Two float panels give eight chains, which hide the latency that the four chains of one panel do
+ * not. One double panel has eight already, and they fill the registers. */
 #ifndef EITS_DOUBLE
 static void avx2_sum_two_panels(const eits_real *panel, const eits_real *other, const eits_real *v,
                                 uint32_t rows, eits_real *sum)
@@ -117,7 +118,7 @@ static void avx2_sum_two_panels(const eits_real *panel, const eits_real *other, 
 
 #include "kernels/avx2_dots.h" /* uses the lanes of avx2_stored.h */
 
-/* No default in these: the compiler then reports a storage type that is missing. */
+/* These switches have no default, so that the compiler reports a storage type that is missing. */
 static void avx2_mul(const eits_matrix *matrix, const uint32_t *index, const eits_real *value,
                      uint32_t count, eits_real *out)
 {
@@ -195,8 +196,8 @@ static void avx2_unpack(const eits_matrix *matrix, size_t first, size_t count, f
     }
 }
 
-/* As in kernels/body.h, each lane by the same operations in the same order. The branches become
- * masks: a lane that is not above its threshold gets zero by AND. SUB(v, v) is zero, or NaN where v
+/* Each lane does the same operations in the same order as kernels/body.h. Masks replace the
+ * branches: a lane that is not above its threshold gets zero by AND. SUB(v, v) is zero, or NaN if v
  * is not finite. */
 static void avx2_prox(const eits_prox *how, uint32_t n, const eits_real *restrict gradient,
                       const eits_real *restrict x, eits_real *restrict next, eits_real *restrict z)
@@ -216,7 +217,8 @@ static void avx2_prox(const eits_prox *how, uint32_t n, const eits_real *restric
         STORE(next + j, moved);
         STORE(z + j, FMA(betas, SUB(moved, LOAD(x + j)), moved));
     }
-    /* The rest, fewer than a vector, one by one: the same operations, the same bits. */
+    /* Fewer numbers than a vector are left. They are computed one by one, by the same operations
+     * and so with the same bits. */
     for (; j < n; ++j) {
         const eits_real v = eits_fma(step, gradient[j], z[j]);
         const eits_real up = allow_up && v > t ? v - t : 0, down = allow_down && v < -t ? v + t : 0;

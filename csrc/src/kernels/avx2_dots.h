@@ -1,6 +1,6 @@
-/* Part of avx2.c: products by eight lanes and a tree, and the greatest and the non-zero of many
- * numbers. Eight lanes are one float register or two double ones: a column is read in order without
- * a transpose, and the trees of four columns are added together. */
+/* This part of avx2.c has the products by eight lanes and a tree, the greatest of many numbers and
+ * the list of the non-zero ones. Eight lanes are one float register or two double ones: a column is
+ * read in order without a transpose, and the trees of four columns are added together. */
 
 /* out = the trees of four columns' eight lanes each, in the order of eits_tree8. */
 static inline void four_trees(vector lanes[4][8 / LANES], eits_real *out)
@@ -25,8 +25,8 @@ static inline void four_trees(vector lanes[4][8 / LANES], eits_real *out)
 #endif
 }
 
-/* Four columns at a time; of the last few the last again. `rest` marks the lanes of the numbers
- * beyond whole eights. */
+/* Four columns are read at a time. If fewer are left, the last one is read again in the spare
+ * lanes. `rest` marks the lanes of the numbers beyond the last multiple of eight. */
 #define DEFINE_DOTS(TAG, TYPE)                                                                  \
     static void dots_##TAG(const eits_matrix *matrix, const uint32_t *index, uint32_t count,    \
                            const eits_real *v, eits_real *out)                                  \
@@ -130,8 +130,8 @@ static void avx2_rows_add(const eits_real *rows, size_t stride, uint32_t count, 
     }
 }
 
-/* Of numbers that are equal it does not matter which is the greatest, so neither does the order.
- * Where the first operand of a maximum is NaN the second is taken. */
+/* The order does not change the result, since equal numbers are interchangeable. If the first
+ * operand of MAX is NaN, it returns the second. */
 static eits_real avx2_greatest(const eits_real *a, size_t count, eits_sign sign)
 {
     const vector minus = SET1(-R(0.0)), flip = sign == EITS_SIGN_DECREASE ? minus : ZERO();
@@ -156,8 +156,9 @@ static eits_real avx2_greatest(const eits_real *a, size_t count, eits_sign sign)
 }
 
 #ifndef EITS_DOUBLE
-/* Four at a time: a table says for each pattern of non-zeros how they move together. What is
- * written beyond the non-zeros is written over, and never behind the last of `count` places. */
+/* Four numbers are handled at a time: a table says for each pattern of non-zeros how to move them
+ * together. Numbers written beyond the non-zeros are overwritten by later ones or lie beyond the
+ * returned count; none is written beyond the first `count` places. */
 static uint32_t avx2_nonzeros(const eits_real *a, uint32_t count, uint32_t *place, eits_real *value)
 {
 #define L(k) 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3

@@ -1,9 +1,8 @@
-/* Part of avx2.c: products with each storage type, S x, S'v by chains and to floats. S'v reads
- * LANES columns and transposes LANES x LANES numbers in registers, so that each lane is one
- * column's
- * chain. */
+/* This part of avx2.c has the products with each storage type: S x, S'v by chains, and the
+ * conversion to floats. S'v reads LANES columns and transposes LANES x LANES numbers in registers,
+ * so that each lane is the chain of one column. */
 
-/* Four stored numbers as floats: every conversion is exact. */
+/* These functions read four stored numbers as floats. Every conversion is exact. */
 static inline __m128 four_f32(const float *from)
 {
     return _mm_loadu_ps(from);
@@ -76,8 +75,8 @@ static inline __m256 lanes_i8(const int8_t *from)
         _mm256_cvtepi8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)from)));
 }
 
-/* Four rows from four registers, each with four numbers of a column in either half; blends are
- * cheaper than shuffles. */
+/* Make four rows from four registers, each of which has four numbers of a column in either half.
+ * Blends are cheaper than shuffles. */
 static inline void four_rows(const vector c[4], vector row[4])
 {
     const vector a = _mm256_unpacklo_ps(c[0], c[1]), b = _mm256_unpackhi_ps(c[0], c[1]);
@@ -104,7 +103,8 @@ static inline void four_rows(const vector c[4], vector row[4])
 
 #endif
 
-/* of LANES columns at a time in mul_t: so many chains hide the latency of one */
+/* mul_t reads this many groups of LANES columns at a time: so many chains hide the latency of one
+ */
 enum { GROUPS = 3 };
 
 #define DEFINE_PRODUCTS(TAG, TYPE)                                                                 \

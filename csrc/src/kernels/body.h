@@ -1,5 +1,5 @@
-/* The matrix products, included once for each processor that they are built for (portable.c,
- * avx2.c, m7.c). NAME(x) gives that build's names. Before it includes this, the build defines
+/* The matrix products. Each processor's build includes this file once (portable.c, avx2.c, m7.c).
+ * NAME(x) gives that build's names. Before it includes this file, the build defines
  *
  *     NAME(sum_panel): sum_l = sum over i = 0, 1, ... of panel[i * EITS_PANEL + l] * v_i, for the
  *     EITS_PANEL lanes l
@@ -9,9 +9,9 @@
  * KERNELS_OWN_ROWS (rows_dot, rows_sum), KERNELS_OWN_NONZEROS, KERNELS_OWN_GREATEST,
  * KERNELS_OWN_PROX.
  *
- * The loops are unrolled or laned as far as a compiler needs to find vectors, and no further. A
- * sum's order is part of the result (kernels.h): change a loop here, and every build
- * and the golden frames must still agree to the bit. */
+ * The loops are unrolled or split into lanes as far as a compiler needs to find vectors, and no
+ * further. The order of a sum is part of the result (kernels.h): after a change of a loop here,
+ * every build and the golden frames must still agree to the bit. */
 #include "base/half.h"
 #include "base/vec.h"
 #include "kernels/kernels.h"
@@ -254,14 +254,14 @@ static uint32_t NAME(nonzeros)(const eits_real *a, uint32_t count, uint32_t *pla
     for (uint32_t j = 0; j < count; ++j) {
         place[found] = j;
         value[found] = a[j];
-        found += a[j] != 0; /* without a branch that would be guessed wrong */
+        found += a[j] != 0; /* no branch: it would often be mispredicted */
     }
     return found;
 }
 #endif
 
 #ifndef KERNELS_OWN_GREATEST
-/* Eight at a time: which of them is the greatest does not depend on the order. */
+/* Eight lanes are compared at a time: the greatest does not depend on the order. */
 static eits_real NAME(maximum)(const eits_real *a, size_t count)
 {
     eits_real lane[8] = {0};
@@ -325,8 +325,8 @@ static void NAME(rows_add)(const eits_real *rows, size_t stride, uint32_t count,
 #endif
 
 #ifndef KERNELS_OWN_PROX
-/* The proximal step of threshold |x|_1: of the two halves one is zero, or both. v - v is zero, and
- * NaN where v is not finite: a run that overflows must not end as a zero. */
+/* The proximal step of threshold |x|_1: at least one of `up` and `down` is zero. v - v is zero, or
+ * NaN if v is not finite: a run that overflows must not end as a zero. */
 static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restrict gradient,
                        const eits_real *restrict x, eits_real *restrict next, eits_real *restrict z)
 {
@@ -343,7 +343,6 @@ static void NAME(prox)(const eits_prox *how, uint32_t n, const eits_real *restri
 }
 #endif
 
-/* This build's table. */
 #define KERNELS_TABLE(TEXT)              \
     {.name = TEXT,                       \
      .mul = NAME(mul),                   \

@@ -1,11 +1,11 @@
-/* Single columns of S as numbers, without their scale: where they lie if they are of the library's
- * width, else as a copy. */
+/* Read single columns of S as numbers, without their scale: in place if they are stored in the
+ * width of eits_real, else as a copy. */
 #ifndef EITSKIN_COLUMN_H
 #define EITSKIN_COLUMN_H
 
 #include "kernels/kernels.h"
 
-/* Column j; `copy` (stride numbers) may be written. At least rank numbers. */
+/* Returns column j, with at least `rank` numbers. It may write to `copy` (stride numbers). */
 static inline const eits_real *eits_column(const eits_matrix *matrix, uint32_t j, eits_real *copy)
 {
 #ifndef EITS_DOUBLE

@@ -1,8 +1,9 @@
-/* What the kernels' builds share: choosing one, listing non-zeros, reading columns, making panels.
+/* This file has the functions that all builds of the kernels share: they choose a build, list
+ * non-zeros, read columns and make panels.
  *
- * Speed differs between the builds, bits do not (kernels.h has the order of every sum), so which
- * one runs is decided by the processor and needs no option. The choice is made when a context is
- * set up, not in each product. */
+ * The builds differ in speed, not in bits (kernels.h has the order of every sum). So the processor
+ * decides which one runs, and no option is needed. The choice is made when a context is set up, not
+ * in each product. */
 #include "kernels/kernels.h"
 
 #include "base/half.h"
@@ -10,8 +11,9 @@
 
 #ifdef EITS_BUILD_AVX2
 extern const eits_kernels eits_kernels_avx2;
-#ifdef __clang__ /* which up to version 14 at least does not know the name; each processor with \
-                    AVX2 has it */
+/* clang's __builtin_cpu_supports does not know "f16c", at least up to version 14; each processor
+ * with AVX2 has it. */
+#ifdef __clang__
 #define SUPPORTS_F16C 1
 #else
 #define SUPPORTS_F16C __builtin_cpu_supports("f16c")
@@ -34,8 +36,8 @@ const eits_kernels *eits_kernels_best(void)
 #endif
 }
 
-/* For single numbers; whole columns of a storage type go through the kernels' own loops. No default
- * case, so that the compiler reports a storage type that is missing. */
+/* Read a single number; the kernels' own loops read whole columns of a storage type. The switch has
+ * no default case, so that the compiler reports a storage type that is missing. */
 static eits_real read_entry(const eits_matrix *matrix, size_t at)
 {
     switch (matrix->storage) {
@@ -66,8 +68,8 @@ void eits_scale_listed(const eits_matrix *matrix, const uint32_t *index, uint32_
         values[k] *= (eits_real)matrix->scale[index[k]];
 }
 
-/* Listed first, so that the product has no test in its loop; scales go to the few values rather
- * than to every stored number. */
+/* Non-zeros are listed first, so that the product has no test in its loop. Scales are multiplied
+ * into these few values rather than into every stored number. */
 uint32_t eits_list_nonzeros(const eits_kernels *kernels, const eits_matrix *matrix,
                             const eits_real *x, uint32_t *index, eits_real *value)
 {

@@ -1,23 +1,23 @@
-/* The matrix products for a Cortex-M7 with its single-precision FPU. The portable C loads each
- * number by an instruction of its own; here VLDM loads many by one, so that an instruction is spent
- * on little but the FMA. Each sum is the same chain in the same order, hence the same bits.
- * Instructions a multiply-accumulate: mul_t 1.35 (f16 2.4, i16 3.3, i8 4.0), mul 1.35 (other
- * storages are unpacked block by block before, for dots too), dot 1.5; to unpack a number: f16 1.5,
- * i16 and i8 3.1.
+/* The matrix products for a Cortex-M7 with its single-precision FPU. A compiler loads each number
+ * by an instruction of its own; here one VLDM loads many, so that most instructions are FMAs. Each
+ * sum is the same chain in the same order as in the portable build, so the bits are the same.
+ * Instructions per multiply-accumulate: mul_t 1.35 (f16 2.4, i16 3.3, i8 4.0), mul 1.35, dot 1.5;
+ * for mul and dots, other storages are unpacked block by block before. Instructions to unpack a
+ * number: f16 1.5, i16 and i8 3.1.
  *
- * Written in assembly since compilers load one number an instruction here. The FPU
- * has s0 to s31; sums stay in the upper half (s16 or s24 on) while the lower half takes what is
- * loaded. Operands name what changes ("+r"), clobbers name every register used, and "memory" keeps
- * the compiler from moving loads and stores across.
+ * The FPU has s0 to s31; sums stay in the upper half (from s16 or s24 on) while the lower half
+ * takes the numbers that are loaded. Operands name the variables that change ("+r"), clobbers name
+ * every register used, and "memory" keeps the compiler from moving loads and stores across.
  *
- * Conversions are exact, so unpacking first and multiplying after gives the bits of a product that
- * reads storage directly. */
+ * Conversions are exact, so a number that is unpacked first and multiplied after gives the same
+ * bits as a product that reads storage directly. */
 #define NAME(x) m7_##x
 
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
-/* For contexts with panels (eits_init with memory for them); boards have none to spare. */
+/* Contexts with panels use this (eits_init got memory for them); boards have no memory to spare for
+ * panels. */
 static void m7_sum_panel(const eits_real *panel, const eits_real *v, uint32_t rows, eits_real *sum)
 {
     for (uint32_t l = 0; l < EITS_PANEL; ++l) {
@@ -41,8 +41,8 @@ static void m7_sum_panel(const eits_real *panel, const eits_real *v, uint32_t ro
 
 #include "kernels/m7_unpack.h"
 
-/* ---- S'v: eight columns at a time, by fours, so that four chains hide the latency of one; eight
- * rows a turn ---- */
+/* ---- S'v: eight columns at a time, in two groups of four, so that four chains hide the latency of
+ * one; eight rows per turn ---- */
 
 #define FMA4(A0, A1, A2, A3, R0, R1, R2, R3, V)                                        \
     "vfma.f32 s" #A0 ", s" #R0 ", s" #V "\n\tvfma.f32 s" #A1 ", s" #R1 ", s" #V "\n\t" \
@@ -56,7 +56,7 @@ static void m7_sum_panel(const eits_real *panel, const eits_real *v, uint32_t ro
             FMA4(A0, A1, A2, A3, 3, 7, 11, 15, V3)
 static const float zeros[16];
 
-/* out = the sums over these rows */
+/* out = the sums over these rows, for eight columns */
 static void eight_columns(const float *const column[8], const float *v, uint32_t rows, float *out)
 {
     const float *c0 = column[0], *c1 = column[1], *c2 = column[2], *c3 = column[3];
@@ -115,9 +115,9 @@ static void mul_t_f32(const eits_matrix *matrix, const uint32_t *index, uint32_t
     }
 }
 
-/* Other storages: two columns at a time, eight rows a turn, converted in registers. Each leaves the
- * numbers of the first column in s0-s7 and of the second in s8-s15, in the order that its FMAs
- * name. */
+/* For the other storages, two columns at a time are converted in registers, eight rows per turn.
+ * Each CONVERT leaves the numbers of the first column in s0-s7 and of the second in s8-s15, in the
+ * order that its FMAS name. */
 #define BOTH(S, T, V) "vfma.f32 s24, s" #S ", s" #V "\n\tvfma.f32 s25, s" #T ", s" #V "\n\t"
 #define TWO_COLUMNS(NAME, CONVERT, FMAS)                                                         \
     static void NAME(const void *c0, const void *c1, const float *v, uint32_t turns, float *sum) \
@@ -134,7 +134,8 @@ static void mul_t_f32(const eits_matrix *matrix, const uint32_t *index, uint32_t
                          : LOW_S, MIDDLE_S, "s24", "s25", "cc", "memory");                       \
     }
 
-/* in place: a register is overwritten when its own halves are taken */
+/* the conversion works in place: a register is overwritten only after its own two halves are read
+ */
 #define HALVES_FROM(C, A, B, C4, C5, C6, C7, D, E, F, G)                                     \
     "vldmia %[" #C "]!, {s" #C4 "-s" #C7 "}\n\t" HALVES(C4, A, B) HALVES(C5, D, E)           \
         HALVES(C6, F, G) "vcvtb.f32.f16 s" #C6 ", s" #C7 "\n\tvcvtt.f32.f16 s" #C7 ", s" #C7 \
@@ -148,8 +149,8 @@ TWO_COLUMNS(two_columns_f16,
                 HALVES_FROM(c1, 8, 9, 12, 13, 14, 15, 10, 11, 12, 13),
             IN_ORDER)
 
-/* low halves convert where they were loaded, high halves by way of the core's registers: they stand
- * four registers higher */
+/* low halves are converted in the register into which they were loaded; high halves go through the
+ * core's registers and end four registers higher */
 #define LOW_HALF(S) "vcvt.f32.s16 s" #S ", s" #S ", #0\n\t"
 #define SHORTS_FROM(C, S0, S1, S2, S3, S4, S5, S6, S7)                                             \
     "vldmia %[" #C "], {s" #S0 "-s" #S3 "}\n\tldrd %[a], %[b], [%[" #C                             \
@@ -187,7 +188,7 @@ static void mul_t_packed(const eits_matrix *matrix, const uint32_t *index, uint3
     const uint8_t *data = matrix->data;
     const size_t stride = matrix->stride;
     const uint32_t shift = byte ? 0 : 1, whole = matrix->rows / 8 * 8;
-    for (uint32_t k = 0; k < count; k += 2) { /* the last may be taken twice */
+    for (uint32_t k = 0; k < count; k += 2) { /* if one column is left, it is computed twice */
         const uint32_t next = k + 1 < count ? k + 1 : k;
         const size_t at[2] = {stride * (index != NULL ? index[k] : k),
                               stride * (index != NULL ? index[next] : next)};
@@ -215,7 +216,7 @@ static void own_mul_t(const eits_matrix *matrix, const uint32_t *index, uint32_t
         mul_t_packed(matrix, index, count, v, out);
 }
 
-/* ---- S x: sixteen rows of the sum stay in registers while the columns pass, two a turn ---- */
+/* ---- S x: sixteen rows of the sum stay in registers while the columns pass, two per turn ---- */
 
 #define FMA8(V, A0, A1, A2, A3, A4, A5, A6, A7)                                          \
     "vfma.f32 s" #A0 ", s0, s" #V "\n\tvfma.f32 s" #A1 ", s1, s" #V "\n\tvfma.f32 s" #A2 \
@@ -280,8 +281,8 @@ static void mul_f32(const eits_matrix *matrix, const uint32_t *index, const eits
     few_rows(data + row, stride, index, value, count, out + row, (uint32_t)(stride - row));
 }
 
-/* Sixteen rows of eight columns at a time: half a kilobyte of stack instead of a copy of S, and
- * each number is unpacked once. */
+/* Sixteen rows of eight columns are unpacked at a time: this takes half a kilobyte of stack instead
+ * of a copy of S, and each number is unpacked once. */
 static void mul_unpacked(const eits_matrix *matrix, const uint32_t *index, const eits_real *value,
                          uint32_t count, eits_real *out)
 {

@@ -1,5 +1,5 @@
-/* Stored numbers to floats on a Cortex-M7, eight a turn; `turns` is at least 1. Included by m7.c
- * alone. Every conversion is exact. */
+/* Convert stored numbers to floats on a Cortex-M7, eight per turn; `turns` is at least 1. Only m7.c
+ * includes this file. Every conversion is exact. */
 #ifndef EITSKIN_M7_UNPACK_H
 #define EITSKIN_M7_UNPACK_H
 

@@ -1,5 +1,6 @@
-/* Part of m7.c: dots, axpy, rows. Eight lanes are s16 to s23; a turn loads eight numbers of either
- * vector by one VLDM each. The rest beyond whole eights is done in C, by the same lanes. */
+/* This part of m7.c has dots, axpy and rows. Eight lanes are s16 to s23; a turn loads eight numbers
+ * of either vector by one VLDM each. Numbers beyond the last multiple of eight are added in C, to
+ * the same lanes. */
 
 #define EIGHTS                                                                                    \
     "1:\n\t"                                                                                      \

@@ -14,8 +14,8 @@ enum { CHECKSUM = 4, MIN = (int)EITS_LINK_HEAD + CHECKSUM, LONGEST_BLOCK = 0xFF 
 typedef struct stuffer {
     uint8_t *out;
     size_t at;      /* next byte */
-    size_t code_at; /* where the open block's code goes */
-    uint8_t code;   /* of the open block: its bytes so far, and one */
+    size_t code_at; /* place of the open block's code */
+    uint8_t code;   /* code of the open block: 1 + its bytes so far */
 } stuffer;
 
 static void open_block(stuffer *s)
@@ -25,8 +25,9 @@ static void open_block(stuffer *s)
 }
 
 /* Consistent overhead byte stuffing (Cheshire and Baker, IEEE/ACM Trans. Networking 7, 1999): each
- * zero becomes the distance to the next, so that zeros alone part packets and whoever comes late
- * finds the next one. At most one byte in 254 is added. */
+ * zero is replaced by the distance to the next one, so that zeros occur only between packets, and a
+ * receiver that starts in the middle of a stream finds the next packet. It adds at most one byte in
+ * 254. */
 static void stuff(stuffer *s, const uint8_t *bytes, size_t size)
 {
     for (size_t i = 0; i < size; ++i) {
@@ -44,7 +45,8 @@ static void stuff(stuffer *s, const uint8_t *bytes, size_t size)
     }
 }
 
-/* Bytes by shifts, low ones first: the same on every processor, aligned or not. */
+/* Bytes are written by shifts, the low one first: this works the same on every processor and at any
+ * alignment. */
 static void put_u16(uint8_t *out, uint32_t value)
 {
     out[0] = (uint8_t)value;
@@ -57,8 +59,9 @@ static void put_u32(uint8_t *out, uint32_t value)
     put_u16(out + 2, value >> 16);
 }
 
-/* Head and body apart, so that an image goes out of the context's own memory, without a copy that a
- * board would need room for. Sizes are compared one after the other: their sum could wrap. */
+/* Head and body are separate arguments, so that an image is sent from the context's own memory,
+ * without a copy for which a board would need memory. Sizes are compared one after the other, since
+ * their sum could wrap. */
 size_t eits_link_encode(uint8_t *out, size_t room, uint8_t type, uint32_t sequence,
                         const void *head, size_t head_size, const void *body, size_t body_size)
 {
@@ -78,8 +81,8 @@ size_t eits_link_encode(uint8_t *out, size_t room, uint8_t type, uint32_t sequen
     put_u32(checksum, crc);
 
     stuffer s = {.out = out, .at = 1};
-    /* A zero before as well as after: what was on the line before ends there, and cannot take this
-     * packet with it. */
+    /* A zero is sent before the packet as well as after it: it ends any bytes that were on the line
+     * before, so that they cannot damage this packet. */
     out[0] = 0;
     open_block(&s);
     stuff(&s, start, sizeof start);
@@ -103,8 +106,8 @@ static uint32_t get_u32(const uint8_t *bytes)
     return get_u16(bytes) | get_u16(bytes + 2) << 16;
 }
 
-/* The buffer begins at 8 bytes, and so does the payload behind a head of 8: receivers may read its
- * numbers in place. */
+/* The buffer is aligned to 8 bytes, and so is the payload behind a head of 8: receivers may read
+ * its numbers in place. */
 eits_status eits_link_decoder_init(eits_link_decoder *decoder, uint8_t *buffer, size_t room)
 {
     if (!decoder || !buffer || (uintptr_t)buffer % 8u != 0 || room < (size_t)MIN)
@@ -115,7 +118,7 @@ eits_status eits_link_decoder_init(eits_link_decoder *decoder, uint8_t *buffer, 
     return EITS_OK;
 }
 
-/* A packet that is longer than the buffer is counted once and passed over to its end. */
+/* A packet that is longer than the buffer is counted once, and its remaining bytes are skipped. */
 static void keep(eits_link_decoder *d, uint8_t byte)
 {
     if (d->used < d->room) {
@@ -126,8 +129,8 @@ static void keep(eits_link_decoder *d, uint8_t byte)
     }
 }
 
-/* A byte that is not zero. A block's code stands for the zero before it, but for the first of a
- * packet and after a full block. */
+/* Take a byte that is not zero. The code of a block stands for the zero before the block, except
+ * for the first block of a packet and after a full block. */
 static void unstuff(eits_link_decoder *d, uint8_t byte)
 {
     if (d->left > 0) {
@@ -142,18 +145,19 @@ static void unstuff(eits_link_decoder *d, uint8_t byte)
     d->left = (uint8_t)(byte - 1u);
 }
 
-/* What lies between two zeros is over: a packet, or counted as what it is. */
+/* A zero has ended the bytes since the last one: report them as a packet, or count the error. */
 static void finish(eits_link_decoder *d, eits_link_packet *packet)
 {
     if (d->broken)
         return;
-    /* a block that promised more bytes was cut, or two packets have run together */
+    /* a block announced more bytes, so it was cut, or two packets have run together */
     if (d->left > 0 || d->used < (size_t)MIN) {
         ++d->framing_errors;
         return;
     }
     const size_t size = d->used - (size_t)MIN;
-    /* The checksum before the version: a damaged first byte is no other version. */
+    /* The checksum is checked before the version: a damaged first byte must not be reported as
+     * another version. */
     if (eits_crc32(0, d->buffer, d->used - CHECKSUM) != get_u32(d->buffer + d->used - CHECKSUM)) {
         ++d->crc_errors;
     } else if (d->buffer[0] != EITS_LINK_VERSION) {
@@ -170,8 +174,8 @@ static void finish(eits_link_decoder *d, eits_link_packet *packet)
     }
 }
 
-/* Ends behind each packet, so that its payload may be used in place before the buffer is filled
- * again; the caller feeds the rest. */
+/* Returns after each packet, so that the caller may use its payload in place before the buffer is
+ * filled again; the caller then feeds the rest. */
 size_t eits_link_feed(eits_link_decoder *d, const uint8_t *bytes, size_t size,
                       eits_link_packet *packet)
 {
@@ -181,7 +185,7 @@ size_t eits_link_feed(eits_link_decoder *d, const uint8_t *bytes, size_t size,
             unstuff(d, bytes[i]);
             continue;
         }
-        /* zeros may follow one another; between them is no packet */
+        /* zeros may follow one another, with no packet between them */
         if (d->in_packet)
             finish(d, packet);
         d->used = 0;

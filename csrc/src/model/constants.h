@@ -7,14 +7,15 @@
 
 /* clang-format off */
 
-/* ---- Chosen: by hand; not measured. Check: ctest --preset host -R force */
+/* ---- Chosen: by hand, a matter of taste: only forces change at half and at double (study
+ * constants). Check: ctest --preset host -R force */
 
 /* a calibration's gain by place is kept within this factor of 1. larger: a polynomial that runs
  * away beyond its places gives absurd forces; smaller: cuts off gains that were measured */
 #define EITS_MAX_GAIN R(4.0)
 
-/* ---- Chosen: by hand: ten seconds at 50 frames a second. Check: ctest --preset host -R
- * reference_tracking */
+/* ---- Chosen: by hand, a matter of taste: ten seconds at 50 frames per second. Check: ctest
+ * --preset host -R reference_tracking */
 
 /* reference_frames of a model that asks for it [frames]. larger: drift shows as touches; smaller:
  * slow touches are followed */
@@ -40,7 +41,9 @@
  * jitter with the noise */
 #define EITS_TRACK_SMOOTH R(0.66)
 
-/* ---- Chosen: by hand; not measured. Check: ctest --preset host -R model_values */
+/* ---- Chosen: guards against sections that are wrong: at half and at double every model of the
+ * study constants opens alike, but none with FORM_MAX_NORM below 1. Check: ctest --preset host -R
+ * model_values */
 
 /* what a row of section WHIT may differ by from what it says elsewhere, and from P [relative].
  * larger: a wrong section is believed; smaller: rounding makes a good model fail */

@@ -1,5 +1,5 @@
 /* Options: a model's own, those for a stream, and whether options are in range. Names, ranges and
- * usual values come from tables/options.toml. */
+ * default values come from tables/options.toml. */
 #include "model/options.h"
 
 #include "base/vec.h"

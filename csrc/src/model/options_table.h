@@ -1,4 +1,4 @@
-/* Ranges and usual values, included by options.c alone. Written by tables/make_tables.py from
+/* Ranges and default values, included by options.c alone. Written by tables/make_tables.py from
  * tables/options.toml. */
 /* clang-format off */
 #define OPTION(name, whole, least, greatest) \

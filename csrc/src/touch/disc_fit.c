@@ -18,7 +18,7 @@
  * Invariant: f->residual = data - sum of all discs' answers, kept by adding and taking away single
  * atoms; eits_fit_restart makes it exact again after discs or data were exchanged.
  *
- * The k-th disc's atom is at hand (eits_atom) wherever it stands.
+ * The k-th disc's atom is available (eits_atom) wherever it stands.
  *
  * Costs per move of one disc: three slopes, at most three trial atoms, 17 dots.
  */

@@ -180,26 +180,26 @@ def run_frames(
     program: Path,
     folder: Path,
     blob: bytes,
-    quiet_v: AnyArray,
+    untouched_v: AnyArray,
     frames_v: AnyArray,
     options: Options,
     *,
     portable: bool = False,
 ) -> EmulatedRun:
-    """The emulated board's results for ``frames_v`` (k, m) after taring on ``quiet_v`` (q, m),
+    """The emulated board's results for ``frames_v`` (k, m) after taring on ``untouched_v`` (q, m),
     volts.
 
     ``folder`` is where the program finds its files. ``portable``: plain C instead of the
     processor's own kernels.
 
     Raises:
-        UsageError: QEMU is missing, the program fails, or the model, the options or a quiet frame
-            are refused.
+        UsageError: QEMU is missing, the program fails, or the model, the options or an untouched
+            frame are refused.
     """
     done = run_steps(
         program,
         folder,
-        (Load(blob), Choose(options), TareStep(quiet_v), Play(frames_v)),
+        (Load(blob), Choose(options), TareStep(untouched_v), Play(frames_v)),
         portable=portable,
     )
     refused = [f"{word} (status {status})" for word, status in done.statuses if status != 0]

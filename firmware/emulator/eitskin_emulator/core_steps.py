@@ -35,10 +35,10 @@ class Mask:
 
 @dataclass(frozen=True, eq=False)
 class TareStep:
-    """Take the reference from quiet frames (k, m), volts, until one is refused; fewer than four:
-    each again."""
+    """Take the reference from untouched frames (k, m), volts, until one is refused; fewer than
+    four: each again."""
 
-    quiet_v: AnyArray
+    untouched_v: AnyArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ def write_steps(folder: Path, steps: Sequence[Step], *, portable: bool = False) 
 
 def _numbers_of(step: TareStep | Play | Solve | Drives) -> tuple[str, AnyArray]:
     if isinstance(step, TareStep):
-        return "quiet", step.quiet_v
+        return "quiet", step.untouched_v
     if isinstance(step, Drives):
         return "drives", step.scans_v
     return ("frames", step.frames_v) if isinstance(step, Play) else ("solve", step.data)

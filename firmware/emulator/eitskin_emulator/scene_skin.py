@@ -10,11 +10,11 @@ from eitskin.skin.protocol import Protocol
 from eitskin_emulator.analog.skin import AnalogSkin
 
 DONE_BY_THE_BOARD = ("adc",)
-MAX_QUIET = 1024  # as many as a tare takes
+MAX_UNTOUCHED = 1024  # as many as a tare takes
 
 
 class RecordedRows:
-    """The scene's own frames of ``rows`` as a sequence, without the quiet ones."""
+    """The scene's own frames of ``rows`` as a sequence, without the untouched ones."""
 
     def __init__(self, rows: SceneRows) -> None:
         self._rows = rows
@@ -54,6 +54,8 @@ def skin_of(scene: Scene, protocol: Protocol) -> AnalogSkin:
             "  and give it with  --model"
         )
     rows = BoardFrames(scene, DONE_BY_THE_BOARD).rows(protocol)
-    quiet_v = rows.part(range(min(scene.quiet_frames, MAX_QUIET)))
+    untouched_v = rows.part(range(min(scene.quiet_frames, MAX_UNTOUCHED)))
     recorded = RecordedRows(rows)
-    return AnalogSkin(protocol, quiet_v, recorded, scene.rate_hz, recorded if rows.moves else None)
+    return AnalogSkin(
+        protocol, untouched_v, recorded, scene.rate_hz, recorded if rows.moves else None
+    )

@@ -19,7 +19,7 @@ import numpy as np
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.calibration.presses import WeighedPresses
 from eitskin.errors import FrameError, missing_extra
-from eitskin.model.force_law import MAX_ORDER, LoadLaw, monomials
+from eitskin.model.force_law import MAX_ORDER, ForceLaw, monomials
 
 MIN_PRESSES, MIN_WEIGHTS, MIN_RATIO = 4, 3, 1.5
 SAME_WEIGHT = 1.005  # forces within this ratio count as the same weight
@@ -41,14 +41,14 @@ MAX_F0 = 30.0  # times the greatest force; beyond it a saturating law is a strai
 class LawForm:
     """The form of a law with some positive numbers.
 
-    ``strength`` gives strength from force, ``load`` gives force from strength; both take the law's
+    ``strength`` gives strength from force, ``force`` gives force from strength; both take the law's
     numbers, called ``names``. ``least_weights`` is how many different weights the fit needs. The
     fit starts at ``start`` and stays within ``low`` and ``high``: strengths are relative to the
     median strength, F0 to the greatest force, and exponents are absolute.
     """
 
     strength: Callable[..., FloatArray]
-    load: Callable[..., FloatArray]
+    force: Callable[..., FloatArray]
     names: tuple[str, ...]
     text: str
     least_weights: int
@@ -105,7 +105,7 @@ class Calibration:
         notes: sentences about what the data could not determine.
     """
 
-    law: LoadLaw
+    law: ForceLaw
     fitted: FittedLaw
     interval: tuple[tuple[float, float], ...]
     left_out: FloatArray
@@ -289,16 +289,16 @@ def fit(presses: WeighedPresses, radius_mm: float, form: str, order: int) -> Fit
 
 def law_of(
     fitted: FittedLaw, presses: WeighedPresses, radius_mm: float, uncertainty: float
-) -> LoadLaw:
+) -> ForceLaw:
     """Return ``fitted`` as a model stores it: a table up to the greatest force of ``presses``, at
     equal steps of strength."""
     shape, most = FORMS[fitted.form], float(presses.force_n.max())
     top = float(shape.strength(np.array(most), *fitted.numbers))
     strength = np.linspace(0.0, top, TABLE_POINTS)
-    force_n = shape.load(strength[:-1], *fitted.numbers)
+    force_n = shape.force(strength[:-1], *fitted.numbers)
     reach = float(np.hypot(*presses.place_mm.T).max()) / radius_mm
     table = np.concatenate([force_n, [most]]).astype(np.float32)
-    return LoadLaw(
+    return ForceLaw(
         strength.astype(np.float32), table, fitted.gain.astype(np.float32), fitted.order,
         float(np.float32(radius_mm)),
         float(np.float32(reach)), float(np.float32(uncertainty)),

@@ -89,7 +89,7 @@ def run(options: argparse.Namespace) -> int:
 
 def calibrated(model: Model, found: Calibration) -> Model:
     """Return ``model`` with the calibration, which is also added to its description."""
-    return replace(model, load=found.law, meta={**model.meta, "calibration": found.as_dict()})
+    return replace(model, force_law=found.law, meta={**model.meta, "calibration": found.as_dict()})
 
 
 def _frames(path: Path, model: Path | None) -> tuple[Frames, list[int]]:

@@ -169,7 +169,7 @@ def _with_touches(subject: Subject, given: list[str], name: str | None) -> Subje
 
 def _touched(frames: Frames, touches: list[tuple[float, float, float]], name: str | None) -> Frames:
     if not frames.n_frames:
-        raise UsageError("--touch: there is no frame other than quiet ones")
+        raise UsageError("--touch: there is no frame other than untouched ones")
     if name is not None and name not in frames.frame_name:
         raise UsageError(
             f"--touch-in {name}: no such frame; frames are {', '.join(frames.frame_name[:20])}"

@@ -51,8 +51,8 @@ def run(options: argparse.Namespace) -> int:
     return answer(
         options,
         facts,
-        f"{options.output}: {facts['frames']} frame(s) of {facts['channels']} channels,"
-        f" {facts['quiet_frames']} quiet, {facts['electrodes']} electrodes, {facts['touches']}"
+        f"{options.output}: {facts['frames']} frame(s) of {facts['channels']} rows,"
+        f" {facts['quiet_frames']} untouched, {facts['electrodes']} electrodes, {facts['touches']}"
         f" known touches; unit {facts['unit']}",
         f"next: eitskin doctor {options.output}{with_skin}",
     )

@@ -222,9 +222,9 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
 
 
 def _calibration_text(model: Model) -> str:
-    if model.load is None:
+    if model.force_law is None:
         return "none; touches have no force"
-    law = model.load
+    law = model.force_law
     return (
         f"up to {force_text(law.force_n[-1])}, 95 % within {100 * law.uncertainty:.1f} %, gain"
         f" of order {law.order}"

@@ -77,11 +77,11 @@ def _export(options: argparse.Namespace) -> None:
     frames = frames_of(options.recording, options.model)
     kept, left_out = finite_only(frames, str(options.recording))
     save_frames(options.frames, kept)
-    quiet = len(kept.reference_voltage_v)
+    untouched = len(kept.reference_voltage_v)
     facts = {"recording": str(options.recording), "frames_file": str(options.frames)}
-    counts = {"frames": kept.n_frames, "quiet_frames": quiet, "left_out": left_out}
+    counts = {"frames": kept.n_frames, "quiet_frames": untouched, "left_out": left_out}
     more = f"; {left_out} with rows that could not be measured left out" if left_out else ""
-    text = f"{options.frames}: {kept.n_frames} frames, {quiet} quiet{more}"
+    text = f"{options.frames}: {kept.n_frames} frames, {untouched} untouched{more}"
     answer(options, facts | counts, text)
 
 

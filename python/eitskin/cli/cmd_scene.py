@@ -62,7 +62,7 @@ def run_scene(options: argparse.Namespace) -> int:
     return answer(
         options,
         facts | more,
-        f"{scene.name}: {scene.frames} frames after {scene.quiet_frames} quiet ones ->"
+        f"{scene.name}: {scene.frames} frames after {scene.quiet_frames} untouched ones ->"
         f" {options.output}",
         f"effects: {', '.join(scene.effects) or 'none'}",
         ", ".join(f"{value} {name.replace('_', ' ')}" for name, value in counters.items() if value),

@@ -232,15 +232,11 @@ def _add_repairs(group: Any) -> None:
         metavar="I,J",
         help="the wires of these electrodes are exchanged; can be repeated",
     )
-    option(
-        group, "--flip-channels LIST", "change the sign of these channels (numbers in our order)"
-    )
-    option(group, "--impute-channels LIST", "fill these channels from their reciprocals")
-    option(
-        group, "--drop-channels LIST", "leave out these channels (the result is a table protocol)"
-    )
-    option(group, "--drop-electrodes LIST", "leave out all channels of these electrodes")
-    option(group, "--equalise", "give each channel the gain of the homogeneous prediction")
+    option(group, "--flip-channels LIST", "change the sign of these rows (numbers in our order)")
+    option(group, "--impute-channels LIST", "fill these rows from their reciprocals")
+    option(group, "--drop-channels LIST", "leave out these rows (the result is a table protocol)")
+    option(group, "--drop-electrodes LIST", "leave out all rows of these electrodes")
+    option(group, "--equalise", "give each row the gain of the homogeneous prediction")
 
 
 def _add_truth(group: Any) -> None:

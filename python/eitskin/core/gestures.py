@@ -118,7 +118,7 @@ class Gestures:
         module = load_core("float32")
         self._lib, self._ffi = module.lib, module.ffi
         self._options = self._ffi.new("eits_gesture_options *")
-        self._lib.eits_gestures_usual(self._options)
+        self._lib.eits_gestures_default(self._options)
         for name, value in options.items():
             try:
                 setattr(self._options, name, value)

@@ -21,7 +21,7 @@ class EventKind(IntEnum):
 
 
 class EventPhase(IntEnum):
-    """eits_event_phase: Where an event lies in what it tells of."""
+    """eits_event_phase: Where an event lies in what it reports."""
 
     ONCE = 0  # all of it
     BEGIN = 1  # it was recognised and goes on

@@ -19,7 +19,7 @@ MAX_TRACK_FRAMES = 1000
 
 @dataclass(frozen=True)
 class OptionFields:
-    """The options. Lambdas are in the units of S'y. docs/reference/options.md lists usual values
+    """The options. Lambdas are in the units of S'y. docs/reference/options.md lists default values
     and ranges.
     """
 

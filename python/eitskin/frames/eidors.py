@@ -63,7 +63,7 @@ def save_eidors(
         "c2f": shares.tocsc(),
     }
     if frames is not None:
-        content["vh"] = _data("mean quiet frame", frames.reference_v[:, None])
+        content["vh"] = _data("mean untouched frame", frames.reference_v[:, None])
         content["vi"] = _data("frames", frames.voltage_v.T, frames.time_s)
     if images_s_per_m is not None:
         content["img"] = _image("eitskin", shares @ images_s_per_m.T * thickness_m, model)

@@ -84,14 +84,14 @@ class Frames:
     allow_nonfinite: bool = False
 
     def __post_init__(self) -> None:
-        channels = len(self.protocol.drive_measure)
+        rows = len(self.protocol.drive_measure)
         reference = np.atleast_2d(_floats(self.reference_voltage_v, "reference_voltage_v"))
-        self._set(
-            "reference_voltage_v", _shaped(reference, (None, channels), "reference_voltage_v")
-        )
+        self._set("reference_voltage_v", _shaped(reference, (None, rows), "reference_voltage_v"))
         if not len(reference):
-            raise FrameError("reference_voltage_v is empty; frames need at least one quiet frame")
-        voltage = _shaped(_floats(self.voltage_v, "voltage_v"), (None, channels), "voltage_v")
+            raise FrameError(
+                "reference_voltage_v is empty; frames need at least one untouched frame"
+            )
+        voltage = _shaped(_floats(self.voltage_v, "voltage_v"), (None, rows), "voltage_v")
         self._set("voltage_v", voltage)
         n = len(voltage)
         if not self.allow_nonfinite:
@@ -104,7 +104,7 @@ class Frames:
         if self.time_s is not None:
             self._set("time_s", _shaped(_floats(self.time_s, "time_s"), (n,), "time_s"))
         if self.row_time_s is not None:
-            row_time_s = _shaped(_floats(self.row_time_s, "row_time_s"), (channels,), "row_time_s")
+            row_time_s = _shaped(_floats(self.row_time_s, "row_time_s"), (rows,), "row_time_s")
             _refuse_nonfinite(row_time_s[None], "row_time_s")
             self._set("row_time_s", row_time_s)
         self._check_touches(n)
@@ -195,8 +195,8 @@ class Frames:
             self._set("truth_conductivity_s_per_m", conductivity)
 
     def __repr__(self) -> str:
-        quiet = len(self.reference_voltage_v)
-        return f"<Frames {self.n_frames} of {self.protocol.n_rows} rows, {quiet} quiet>"
+        untouched = len(self.reference_voltage_v)
+        return f"<Frames {self.n_frames} of {self.protocol.n_rows} rows, {untouched} untouched>"
 
     @property
     def n_frames(self) -> int:
@@ -350,8 +350,8 @@ def _finite(values: FloatArray) -> FloatArray:
 def _refuse_nonfinite(values: FloatArray, name: str) -> None:
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
-        frame, channel = bad[0]
+        frame, row = bad[0]
         raise FrameError(
-            f"{name}: frame {frame}, channel {channel} is {values[frame, channel]} ({len(bad)} such"
-            " values); run  eitskin doctor  on the source, or leave those channels out"
+            f"{name}: frame {frame}, row {row} is {values[frame, row]} ({len(bad)} such"
+            " values); run  eitskin doctor  on the source, or leave those rows out"
         )

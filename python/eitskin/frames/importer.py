@@ -21,7 +21,7 @@ from eitskin.frames.homogeneous import homogeneous
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.orders import match_rows, relabel, source_table, swap_map
 from eitskin.frames.placement import source_rows
-from eitskin.frames.repair import equalising_gains, flipped, imputed, kept_channels, signed
+from eitskin.frames.repair import equalising_gains, flipped, imputed, kept_rows, signed
 from eitskin.frames.source import (
     RawFrames,
     SourceOptions,
@@ -34,7 +34,7 @@ from eitskin.frames.truth import TruthOptions, truth_fields
 from eitskin.skin.protocol import Protocol, table
 from eitskin.skin.skin import Skin
 
-ASSUMED_QUIET = "no quiet frames were named; the first frame is used as one"
+ASSUMED_UNTOUCHED = "no untouched frames were named; the first frame is used as one"
 
 
 def import_frames(
@@ -63,21 +63,21 @@ def import_frames(
     raw, base, protocol = _read(path, options, protocol, n_electrodes)
     if not (lenient or options.impute_channels or options.drop_channels or options.drop_electrodes):
         refuse_nonfinite(raw, str(path))
-    quiet = raw.reference
-    if quiet is None:
+    untouched = raw.reference
+    if untouched is None:
         if not lenient:
             raise UsageError(
-                f"{path}: say which frames are quiet: --reference KEY, --reference-columns LIST,"
-                " --reference-frames A:B"
+                f"{path}: say which frames are untouched: --reference KEY, --reference-columns"
+                " LIST, --reference-frames A:B"
             )
-        quiet = raw.voltage[:1]
+        untouched = raw.voltage[:1]
     rows, index, sign = _placed(raw, options, protocol, skin, n_electrodes, str(path))
-    voltage, reference = raw.voltage[:, index] * sign, quiet[:, index] * sign
+    voltage, reference = raw.voltage[:, index] * sign, untouched[:, index] * sign
     n = _count(protocol, n_electrodes)
     rows = relabel(rows, swap_map(n, options.swaps))
     predicted = options.sign == "magnitude" or options.equalise
     prediction = homogeneous(skin, n).voltages(rows) if predicted else None
-    keep = kept_channels(rows, n, options.drop_channels, options.drop_electrodes)
+    keep = kept_rows(rows, n, options.drop_channels, options.drop_electrodes)
     for_all = (rows, n, options.impute_channels)
     signs = (signed(values, options.sign, prediction) for values in (voltage, reference))
     turned = (flipped(values, options.flip_channels) for values in signs)
@@ -103,7 +103,7 @@ def import_frames(
         "meta": (
             _meta(path, options, base, skin)
             | ({"notes": list(raw.notes)} if raw.notes else {})
-            | ({} if raw.reference is not None else {"assumed": ASSUMED_QUIET})
+            | ({} if raw.reference is not None else {"assumed": ASSUMED_UNTOUCHED})
         ),
         "allow_nonfinite": lenient,
         **carried,

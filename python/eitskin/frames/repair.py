@@ -24,11 +24,11 @@ def signed(values: FloatArray, sign: str, prediction: FloatArray | None) -> Floa
     return -values if sign == "reversed" else values
 
 
-def flipped(values: FloatArray, channels: Sequence[int]) -> FloatArray:
-    """Return ``values`` (n, m) with the sign of ``channels`` changed."""
-    check_range(channels, values.shape[1], "--flip-channels")
+def flipped(values: FloatArray, flip: Sequence[int]) -> FloatArray:
+    """Return ``values`` (n, m) with the sign of the rows ``flip`` changed."""
+    check_range(flip, values.shape[1], "--flip-channels")
     sign = np.ones(values.shape[1])
-    sign[list(channels)] = -1.0
+    sign[list(flip)] = -1.0
     return values * sign
 
 
@@ -45,7 +45,7 @@ def partners(rows: IntArray, n_electrodes: int) -> dict[int, tuple[int, int]]:
     return partner
 
 
-def kept_channels(
+def kept_rows(
     rows: IntArray, n_electrodes: int, drop_channels: Sequence[int], drop_electrodes: Sequence[int]
 ) -> BoolArray:
     """Return which rows (m,) remain when ``drop_channels`` and all rows that use
@@ -55,35 +55,35 @@ def kept_channels(
     keep = ~touching(rows, drop_electrodes)
     keep[list(drop_channels)] = False
     if not keep.any():
-        raise UsageError("nothing is left after leaving out these channels and electrodes")
+        raise UsageError("nothing is left after leaving out these rows and electrodes")
     return np.asarray(keep)
 
 
 def imputed(
-    values: FloatArray, rows: IntArray, n_electrodes: int, channels: Sequence[int]
+    values: FloatArray, rows: IntArray, n_electrodes: int, fill: Sequence[int]
 ) -> FloatArray:
-    """Return ``values`` (n, m) with ``channels`` replaced by their reciprocals among ``rows`` (m,
-    4)."""
-    check_range(channels, len(rows), "--impute-channels")
+    """Return ``values`` (n, m) with the rows ``fill`` replaced by their reciprocals among ``rows``
+    (m, 4)."""
+    check_range(fill, len(rows), "--impute-channels")
     filled = values.copy()
-    for channel, (other, sign) in good_reciprocals(channels, rows, n_electrodes).items():
-        filled[:, channel] = sign * values[:, other]
+    for row, (other, sign) in good_reciprocals(fill, rows, n_electrodes).items():
+        filled[:, row] = sign * values[:, other]
     return filled
 
 
 def good_reciprocals(
-    channels: Sequence[int], rows: IntArray, n_electrodes: int
+    fill: Sequence[int], rows: IntArray, n_electrodes: int
 ) -> dict[int, tuple[int, int]]:
-    """Return for each of ``channels`` the reciprocal that fills it, which must not be one of them,
-    and the sign."""
-    partner = partners(rows, n_electrodes) if channels else {}
-    for channel in channels:
-        if channel not in partner or partner[channel][0] in channels:
+    """Return for each of the rows ``fill`` the reciprocal that fills it, which must not be one of
+    them, and the sign."""
+    partner = partners(rows, n_electrodes) if fill else {}
+    for row in fill:
+        if row not in partner or partner[row][0] in fill:
             raise UsageError(
-                f"--impute-channels {channel}: {rows[channel].tolist()} has no good reciprocal; use"
+                f"--impute-channels {row}: {rows[row].tolist()} has no good reciprocal; use"
                 " --drop-channels"
             )
-    return {channel: partner[channel] for channel in channels}
+    return {row: partner[row] for row in fill}
 
 
 def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArray:
@@ -98,8 +98,8 @@ def equalising_gains(reference: FloatArray, prediction: FloatArray) -> FloatArra
     weak = np.flatnonzero(~(relative > MIN_GAIN))
     if len(weak):
         raise FrameError(
-            f"channel {weak[0]} has {relative[weak[0]]:.3g} of its predicted reference ({len(weak)}"
-            " such): equalising would only raise noise; leave such channels out first"
+            f"row {weak[0]} has {relative[weak[0]]:.3g} of its predicted reference ({len(weak)}"
+            " such): equalising would only raise noise; leave such rows out first"
             " (--drop-channels, --drop-electrodes)"
         )
     return np.asarray(1 / relative)

@@ -193,21 +193,23 @@ def _from_text(
         comment=options.comment,
         cells=options.cells,
     )
-    quiet = _columns(table, options.reference_columns, "--reference-columns")
+    untouched = _columns(table, options.reference_columns, "--reference-columns")
     time = _columns(table, options.time, "--time")
     columns = _columns(table, options.columns, "--columns")
     if columns is None:
         columns = tuple(
-            k for k in range(table.n_columns) if k not in (quiet or ()) and k not in (time or ())
+            k
+            for k in range(table.n_columns)
+            if k not in (untouched or ()) and k not in (time or ())
         )
     notes = list(table.notes)
     where = f"{path}: {len(table.cells)} rows, {len(columns)} chosen columns"
     values, pairs = _numbers(table, columns, options, "--columns", notes)
     reference = None
-    if quiet is not None:
-        reference, _ = _numbers(table, quiet, options, "--reference-columns", notes)
+    if untouched is not None:
+        reference, _ = _numbers(table, untouched, options, "--reference-columns", notes)
     in_rows = _frames_in_rows(values.shape, row_counts, options.frames_in, where, asked)
-    if in_rows and quiet is not None:
+    if in_rows and untouched is not None:
         raise UsageError(
             "--reference-columns needs channels in rows; where frames are rows use"
             " --reference-frames"
@@ -322,9 +324,9 @@ def _finish(
     if options.reference_frames is not None:
         if reference is not None:
             raise UsageError("--reference-frames does not go with another reference; name one")
-        quiet = chosen(options.reference_frames, len(voltage), (), "--reference-frames")
-        rest = [k for k in range(len(voltage)) if k not in set(quiet)]
-        reference, voltage = voltage[list(quiet)], voltage[rest]
+        untouched = chosen(options.reference_frames, len(voltage), (), "--reference-frames")
+        rest = [k for k in range(len(voltage)) if k not in set(untouched)]
+        reference, voltage = voltage[list(untouched)], voltage[rest]
         names = tuple(names[k] for k in rest) if names else ()
         times = None if times is None else times[rest]
     if np.iscomplexobj(voltage) or (reference is not None and np.iscomplexobj(reference)):

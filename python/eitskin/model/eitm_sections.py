@@ -14,7 +14,7 @@ from eitskin.core.options_table import ALL_TOUCH_FIT, CHOICES
 from eitskin.errors import ModelError
 from eitskin.fem.grid import Grid
 from eitskin.fileio import parse_json
-from eitskin.model.force_law import decode_load, encode_load
+from eitskin.model.force_law import decode_force_law, encode_force_law
 from eitskin.model.model import (
     DATA_KINDS,
     GAIN_DRIFT_KEPT,
@@ -81,8 +81,8 @@ def encode_sections(model: Model) -> Sections:
         ),
         "META": json.dumps(model.meta, sort_keys=True).encode("utf-8"),
     }
-    if model.load is not None:
-        sections["LOAD"] = encode_load(model.load)
+    if model.force_law is not None:
+        sections["LOAD"] = encode_force_law(model.force_law)
     if model.row_form is not None:
         sections["WHIT"] = model.row_form.encode()
     if model.precision is not None:
@@ -391,7 +391,7 @@ def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model
         golden=Golden(golden[: d.n_rows], golden[d.n_rows : 2 * d.n_rows], golden[2 * d.n_rows :]),
         meta=_read_meta(sections["META"], where) if "META" in sections else {},
         fields=_read_fields(sections["FLDS"], d, where) if "FLDS" in sections else None,
-        load=decode_load(sections["LOAD"], where) if "LOAD" in sections else None,
+        force_law=decode_force_law(sections["LOAD"], where) if "LOAD" in sections else None,
         row_form=(
             decode_row_form(sections["WHIT"], projection, where) if "WHIT" in sections else None
         ),

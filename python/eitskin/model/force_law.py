@@ -28,7 +28,7 @@ def monomials(u: FloatArray, v: FloatArray, order: int) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class LoadLaw:
+class ForceLaw:
     """A calibrated law.
 
     ``strength`` (p,) in S/m mm^2 and ``force_n`` (p,) in N are the table for a gain of 1; both
@@ -69,16 +69,16 @@ class LoadLaw:
         )
 
 
-def encode_load(law: LoadLaw) -> bytes:
+def encode_force_law(law: ForceLaw) -> bytes:
     head = HEAD.pack(len(law.strength), law.order, law.radius_mm, law.reach, law.uncertainty)
     content = head + b"".join(
         part.astype("<f4").tobytes() for part in (law.strength, law.force_n, law.gain)
     )
-    decode_load(content, "calibration")
+    decode_force_law(content, "calibration")
     return content
 
 
-def decode_load(content: bytes, where: str) -> LoadLaw:
+def decode_force_law(content: bytes, where: str) -> ForceLaw:
     """Return the law in the section LOAD; ``where`` names the file in errors.
 
     Raises:
@@ -107,4 +107,4 @@ def decode_load(content: bytes, where: str) -> LoadLaw:
             raise wrong
     if not (np.abs(gain) <= MAX_COEFFICIENT).all():
         raise wrong
-    return LoadLaw(strength, force_n, gain, order, radius_mm, reach, uncertainty)
+    return ForceLaw(strength, force_n, gain, order, radius_mm, reach, uncertainty)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from eitskin.arrays import FloatArray
 from eitskin.fem.grid import Grid
-from eitskin.model.force_law import LoadLaw
+from eitskin.model.force_law import ForceLaw
 from eitskin.model.model_errors import ModelErrors
 from eitskin.model.row_form import RowForm
 from eitskin.model.storage import StoredMatrix
@@ -84,10 +84,10 @@ class Model:
     float32, ``stored`` is S, ``column_weight`` (n,) float32 is in S/m per coefficient, and ``meta``
     describes how the model was made.
 
-    The other fields are optional. ``fields`` serve the interaction of touches. ``load`` converts
-    strengths to forces if the skin was calibrated. ``model_errors`` state how far a real skin may
-    differ from the model. ``precision`` (k (k + 1) / 2,) belongs to taught models: the lower
-    triangle of the inverse covariance of the rows' noise. ``place_factor`` multiplies the
+    The other fields are optional. ``fields`` serve the interaction of touches. ``force_law``
+    converts strengths to forces if the skin was calibrated. ``model_errors`` state how far a real
+    skin may differ from the model. ``precision`` (k (k + 1) / 2,) belongs to taught models: the
+    lower triangle of the inverse covariance of the rows' noise. ``place_factor`` multiplies the
     covariance of a place from the fit; 0 means unknown.
     """
 
@@ -106,7 +106,7 @@ class Model:
     golden: Golden
     meta: dict[str, Any] = field(default_factory=dict)
     fields: Fields | None = None
-    load: LoadLaw | None = None
+    force_law: ForceLaw | None = None
     row_form: RowForm | None = None
     model_errors: ModelErrors | None = None
     precision: npt.NDArray[np.float32] | None = None

@@ -223,7 +223,7 @@ class OracleEngine:
     def _check(self, frame: FloatArray, unusable: BoolArray, found: Found) -> None:
         if unusable.sum() > self.options.max_masked:
             raise FrameError(
-                with_diagnostics("frame: too many channels of the frame are unusable", found)
+                with_diagnostics("frame: too many rows of the frame are unusable", found)
             )
         dead = not unusable.all() and not frame[~unusable].any()
         if dead or found.no_signal:
@@ -368,8 +368,8 @@ class OracleEngine:
                 x, y = on_skin(model.grid, x, y)
             strength = disc.change * area_mm2(model, disc)
             touch = Touch(0, x, y, disc.radius_mm, strength, min(1.0, float(share)))
-            if model.load is not None:
-                force = model.load.forces_at(np.array([[x, y]]), np.array([strength]))
+            if model.force_law is not None:
+                force = model.force_law.forces_at(np.array([[x, y]]), np.array([strength]))
                 touch = replace(touch, force_n=float(force[0]))
             out.append(touch)
         out.sort(key=lambda touch: -abs(touch.strength_s_per_m_mm2))

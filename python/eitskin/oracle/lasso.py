@@ -115,11 +115,11 @@ def _non_negative(s: FloatArray, y: FloatArray, lam: float) -> FloatArray:
     least = PROGRESS * max(float(np.abs(s.T @ y).max()), lam)
     refused: set[int] = set()
     for _ in range(MAX_CHANGES):
-        wish = s.T @ (y - s @ x) - lam
-        wish[active | np.isin(np.arange(len(x)), list(refused))] = -np.inf
-        if not wish.max() > least:
+        gain = s.T @ (y - s @ x) - lam
+        gain[active | np.isin(np.arange(len(x)), list(refused))] = -np.inf
+        if not gain.max() > least:
             return x
-        new = int(np.argmax(wish))
+        new = int(np.argmax(gain))
         active[new] = True
         while active.any():
             columns = s[:, active]

@@ -230,7 +230,7 @@ def take_reference(
         )
     if reference.outliers:
         notes.append(
-            f"{plural(reference.outliers, 'reading')} of the quiet frames left out as outliers"
+            f"{plural(reference.outliers, 'reading')} of the untouched frames left out as outliers"
         )
     return reference
 

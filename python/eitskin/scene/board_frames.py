@@ -81,9 +81,9 @@ class SceneRows:
         For a long scene this is only the frame itself, since each frame takes time. If touches
         move, it is either the untouched frames or the frame itself with the rows of its own
         scan."""
-        quiet = self.scene.quiet_frames
-        if self._size == self.scene.n_frames and not (self.moves and frame >= quiet):
-            return 0, self.part(range(quiet if self.moves else self._size))
+        untouched = self.scene.quiet_frames
+        if self._size == self.scene.n_frames and not (self.moves and frame >= untouched):
+            return 0, self.part(range(untouched if self.moves else self._size))
         return frame, self.part(range(frame, frame + 1))
 
     def scan(self, frame: int, row_times_s: FloatArray) -> FloatArray:

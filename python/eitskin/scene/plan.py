@@ -73,8 +73,8 @@ class ScenePlan:
         wide = max(len(cost) for cost in costs)
         lines = [
             (
-                f"scene {self.scene}: {self.frames} frames after {self.quiet_frames} quiet ones, "
-                f"{self.states} distinct state{'s' if self.states != 1 else ''}"
+                f"scene {self.scene}: {self.frames} frames after {self.quiet_frames} untouched"
+                f" ones, {self.states} distinct state{'s' if self.states != 1 else ''}"
             ),
             "",
             f"{'':2} {'step':<18} {'stage':<11} {'cost':<{wide}} what",

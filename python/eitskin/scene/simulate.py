@@ -68,9 +68,10 @@ class Simulated:
         skin, protocol, touches, measurement, seed: what was simulated; ``seed`` is that of contacts
             and noise.
         frames_v: (k, m) measured, one per scene.
-        quiet_v: (q, m) measured without touches.
+        untouched_v: (q, m) measured without touches.
         exact_v: (k, m) the same scenes without noise and converter.
-        exact_quiet_v: (m,) the untouched skin without noise and converter; rms(V0) refers to it.
+        exact_untouched_v: (m,) the untouched skin without noise and converter; rms(V0) refers to
+        it.
         contact_impedance_ohm_m2: (L,) as drawn.
         noise_v: sigma of the noise, 0 without noise.
         lsb_v: a step of the converter, 0 without a converter.
@@ -84,9 +85,9 @@ class Simulated:
     measurement: Measurement
     seed: int
     frames_v: FloatArray
-    quiet_v: FloatArray
+    untouched_v: FloatArray
     exact_v: FloatArray
-    exact_quiet_v: FloatArray
+    exact_untouched_v: FloatArray
     contact_impedance_ohm_m2: FloatArray
     noise_v: float
     lsb_v: float
@@ -97,7 +98,7 @@ class Simulated:
     @property
     def reference_v(self) -> FloatArray:
         """The mean untouched frame (m,)."""
-        return np.asarray(self.quiet_v.mean(axis=0))
+        return np.asarray(self.untouched_v.mean(axis=0))
 
     def differences_v(self) -> FloatArray:
         """Return the touched frames minus the reference, (k, m)."""
@@ -113,7 +114,7 @@ class Simulated:
         return Frames(
             protocol=self.protocol,
             voltage_v=self.frames_v,
-            reference_voltage_v=self.quiet_v,
+            reference_voltage_v=self.untouched_v,
             frame_name=tuple(scene.name for scene in self.touches.scenes),
             touch_frame=np.array([k for k, _ in flat], dtype=np.int64),
             touch_xy_mm=np.array([(touch.x_mm, touch.y_mm) for _, touch in flat]).reshape(-1, 2),
@@ -180,20 +181,22 @@ def simulate(
     contact = skin.electrodes.contact_impedance_ohm_m2 * (1.0 + drawn * how.contact_spread)
     forward = ForwardModel(solved_on, skin, protocol, contact)
     sheet = skin.conductivity_s_per_m
-    quiet = forward.voltages(np.full(solved_on.n_elements, sheet))
+    untouched = forward.voltages(np.full(solved_on.n_elements, sheet))
     scenes: Iterable[TouchScene] = progress(touches.scenes)
     exact = np.array(
         [forward.voltages(conductivity_with(solved_on, scene.touches, sheet)) for scene in scenes]
     )
 
     noise_v = (
-        0.0 if how.snr_db is None else float(np.sqrt((quiet**2).mean()) / 10 ** (how.snr_db / 20))
+        0.0
+        if how.snr_db is None
+        else float(np.sqrt((untouched**2).mean()) / 10 ** (how.snr_db / 20))
     )
-    span_v = how.adc_headroom * float(np.abs(quiet).max())
+    span_v = how.adc_headroom * float(np.abs(untouched).max())
     lsb_v = 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits
     converter = (noise_v, lsb_v, span_v, own_seed)
-    quiet_v, quiet_clipped = measure(
-        np.tile(quiet, (how.quiet_frames, 1)), *converter, f"quiet {role}"
+    untouched_v, untouched_clipped = measure(
+        np.tile(untouched, (how.quiet_frames, 1)), *converter, f"quiet {role}"
     )
     frames_v, clipped = measure(exact, *converter, f"frame {role}")
     return Simulated(
@@ -203,13 +206,13 @@ def simulate(
         measurement=how,
         seed=own_seed,
         frames_v=frames_v,
-        quiet_v=quiet_v,
+        untouched_v=untouched_v,
         exact_v=exact,
-        exact_quiet_v=quiet,
+        exact_untouched_v=untouched,
         contact_impedance_ohm_m2=np.asarray(contact),
         noise_v=noise_v,
         lsb_v=lsb_v,
-        clipped=clipped + quiet_clipped,
+        clipped=clipped + untouched_clipped,
         mesh_nodes=solved_on.n_nodes,
         mesh_elements=solved_on.n_elements,
     )

@@ -149,7 +149,7 @@ class Frame:
     @property
     def untouched(self) -> bool:
         """It is a frame of a tare."""
-        return self.raw is not None and self.raw.quiet
+        return self.raw is not None and self.raw.untouched
 
     @property
     def refused(self) -> str | None:
@@ -238,7 +238,7 @@ class Frame:
             "voltage_v": [v if np.isfinite(v) else None for v in raw.voltage_v.tolist()],
             "quality": raw.quality.tolist(),
             "scan_us": raw.scan_us,
-            "quiet": raw.quiet,
+            "quiet": raw.untouched,
         }
 
     def _truth_facts(self, message: dict[str, Any]) -> dict[str, Any]:

@@ -20,7 +20,7 @@ class WallClock:
 
 class Pacer:
     """Holds each frame until it is due; may be paused, stepped and set to another speed from any
-    thread. What comes late is given on at once, and far behind time begins anew from there."""
+    thread. What comes late is given on at once, and far behind time starts again from there."""
 
     def __init__(self, speed: float = 0.0, clock: WallClock | None = None) -> None:
         self._speed, self._clock = speed, clock or WallClock()

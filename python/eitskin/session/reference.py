@@ -30,7 +30,7 @@ class ReferenceMean:
         except MalformedPacket:
             return
         assert isinstance(raw, RawFrame)
-        if raw.quiet:
+        if raw.untouched:
             self._untouched.append(np.asarray(raw.voltage_v, dtype=np.float64))
             del self._untouched[:-MAX_FRAMES]
         elif self._untouched:

@@ -35,7 +35,7 @@ def set_up(
 
 
 def take_reference(device: Device, frames: int, *, streamed: bool = False) -> None:
-    """Tare; where ``streamed``, the quiet frames are sent as raw frames too, for recordings."""
+    """Tare; where ``streamed``, the untouched frames are sent as raw frames too, for recordings."""
     if not streamed:
         device.tare(frames)
         return

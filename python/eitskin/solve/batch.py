@@ -83,10 +83,10 @@ class Batch:
         first, *_ = [call(engine) for engine in self._engines]
         return first
 
-    def tare(self, quiet_v: npt.ArrayLike) -> LearnedReference:
+    def tare(self, untouched_v: npt.ArrayLike) -> LearnedReference:
         """Take the reference from untouched frames (k, m) or one (m,), in V; four or more also give
         the noise."""
-        frames = np.atleast_2d(np.asarray(quiet_v, dtype=np.float64))
+        frames = np.atleast_2d(np.asarray(untouched_v, dtype=np.float64))
         check_shape(frames, self._engines[0].n_rows, "reference", least=1)
         self._last = self._last[:0]
         return self._on_each(lambda one: one.set_reference(frames))
@@ -135,21 +135,21 @@ class Batch:
 def reconstruct_many(
     model: Model,
     frames_v: npt.ArrayLike,
-    quiet_v: npt.ArrayLike,
+    untouched_v: npt.ArrayLike,
     *,
     threads: int | None = None,
     options: Options | None = None,
     touches: bool = True,
 ) -> list[Reconstruction]:
-    """Return images and touches of frames (k, m) in V after a tare on ``quiet_v`` (q, m) or (m,);
-    see :class:`Batch`.
+    """Return images and touches of frames (k, m) in V after a tare on ``untouched_v`` (q, m) or
+    (m,); see :class:`Batch`.
 
     Raises:
         FrameError: a frame cannot be used; the text has its number.
         UsageError, ModelError: as :class:`Batch`.
     """
     batch = Batch(model, threads=threads, options=options)
-    batch.tare(quiet_v)
+    batch.tare(untouched_v)
     found: list[Reconstruction] = []
     for number, result in enumerate(batch.each(frames_v, touches=touches)):
         if isinstance(result, FrameError):

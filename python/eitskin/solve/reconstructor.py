@@ -113,14 +113,14 @@ class Reconstructor:
                 " model's order, or build a model with their protocol"
             )
 
-    def tare(self, quiet_v: npt.ArrayLike) -> LearnedReference:
+    def tare(self, untouched_v: npt.ArrayLike) -> LearnedReference:
         """Take the reference from untouched frames (k, m) or one (m,), in V. Four or more also give
         the noise, and single readings that contradict the others are left out (``outliers``).
 
         Raises:
             FrameError: a frame has the wrong length or cannot be used.
         """
-        frames = np.atleast_2d(_numbers(quiet_v, "reference"))
+        frames = np.atleast_2d(_numbers(untouched_v, "reference"))
         check_shape(frames, self.model.protocol.n_rows, "reference", least=1)
         return self._engine.set_reference(frames)
 

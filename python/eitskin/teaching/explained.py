@@ -64,7 +64,7 @@ class Explained:
         return (self.chance + min(self.noise, 1)) / 2 > UNEXPLAINED
 
 
-def quiet_progress(items: Iterable[Any], what: str) -> Iterable[Any]:
+def untouched_progress(items: Iterable[Any], what: str) -> Iterable[Any]:
     return items
 
 

@@ -125,10 +125,10 @@ class PressGuide:
             return None
         frames = np.array(self._rest)
         steps = np.diff(frames, axis=0)
-        quiet = np.argsort(np.linalg.norm(steps, axis=1))[
+        untouched = np.argsort(np.linalg.norm(steps, axis=1))[
             :-JUMPS
         ]  # the jump of a finger is not noise
-        spread = steps[quiet].std(axis=0) / np.sqrt(2)
+        spread = steps[untouched].std(axis=0) / np.sqrt(2)
         noise = np.maximum(spread, 0.2 * np.median(spread) + np.finfo(float).tiny)
         noise = noise if self._noise is None else 0.8 * self._noise + 0.2 * noise
         half, mean = len(frames) // 2, frames.mean(axis=0)

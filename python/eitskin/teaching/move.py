@@ -7,7 +7,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.fem.grid import Grid
-from eitskin.model.force_law import LoadLaw, monomials
+from eitskin.model.force_law import ForceLaw, monomials
 from eitskin.skin.outline import polygon
 from eitskin.skin.skin import Skin
 from eitskin.teaching.kernel import Placement, rotation
@@ -48,7 +48,7 @@ class Move:
         x, y = (grid.origin_mm + middle).tolist()
         return replace(grid, origin_mm=(x, y))
 
-    def law(self, law: LoadLaw, grid: Grid, centre_mm: tuple[float, float]) -> LoadLaw:
+    def law(self, law: ForceLaw, grid: Grid, centre_mm: tuple[float, float]) -> ForceLaw:
         """Return ``law`` in the new coordinates, on ``grid``."""
         at = grid.centres_mm()
         u, v = at.T / law.radius_mm

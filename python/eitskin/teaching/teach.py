@@ -11,7 +11,7 @@ from eitskin.calibration.fit import calibrate
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import EitskinError, ProtocolError, UsageError
 from eitskin.fem.grid import Grid
-from eitskin.model.force_law import LoadLaw
+from eitskin.model.force_law import ForceLaw
 from eitskin.model.model import Model
 from eitskin.progress import Progress, silent
 from eitskin.skin.skin import Skin, skin_to_table
@@ -135,7 +135,7 @@ def teach(
     report["reference_age"] = reference_age
     report["held_out_by_presses"] = learning_curve(found, judged, reference_age, least_share, held)
     report["fit_s"] = round(time.monotonic() - begun, 2)
-    model = replace(model, load=law, meta={**model.meta, "teach": report})
+    model = replace(model, force_law=law, meta={**model.meta, "teach": report})
     return Taught(model, learned, left_out, held, report)
 
 
@@ -295,7 +295,7 @@ def learning_curve(
     }
 
 
-def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[LoadLaw | None, list[str]]:
+def size_law(presses: Presses, held: HeldOut, grid: Grid) -> tuple[ForceLaw | None, list[str]]:
     """Return the law from strength to force (or to depth if only that is known) from held-out
     presses, and notes."""
     from eitskin.calibration.presses import WeighedPresses

@@ -20,7 +20,7 @@ import numpy as np
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import ProtocolError
 from eitskin.fem.grid import between_pixels, grid_for
-from eitskin.model.force_law import LoadLaw
+from eitskin.model.force_law import ForceLaw
 from eitskin.model.model import Model
 from eitskin.progress import Progress, silent
 from eitskin.skin.skin import Skin, skin_to_table
@@ -180,7 +180,7 @@ def update(
         grid = move.grid(model.grid, prior.kernel.centre_mm)
     new = taught_model(found[chosen], presses.protocol, grid, presses.untouched, least_share, meta)
     law = _law(model, new, move, prior, presses)
-    new = replace(new, defaults=defaults, load=law, place_factor=model.place_factor)
+    new = replace(new, defaults=defaults, force_law=law, place_factor=model.place_factor)
     return Updated(new, chosen, move, report)
 
 
@@ -362,13 +362,13 @@ def choice(errors: dict[str, FloatArray], floor_mm: float) -> str:
     return chosen
 
 
-def _law(old: Model, new: Model, move: Move, prior: Prior, presses: Presses) -> LoadLaw | None:
+def _law(old: Model, new: Model, move: Move, prior: Prior, presses: Presses) -> ForceLaw | None:
     """Return the old law of force in the new coordinates, with strengths in the scale of the new
     model, taken from presses of known size."""
     given = known_size(presses)
-    if old.load is None:
+    if old.force_law is None:
         return None
-    law = move.law(old.load, new.grid, prior.kernel.centre_mm)
+    law = move.law(old.force_law, new.grid, prior.kernel.centre_mm)
     if given is None:
         return law
     strength = solve_presses(new, presses)[2]

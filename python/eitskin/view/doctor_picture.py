@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from eitskin.frames.doctor.case import Case
-from eitskin.frames.doctor.gain import channel_gains
-from eitskin.frames.doctor.noise import MIN_QUIET, channel_noise
+from eitskin.frames.doctor.gain import row_gains
+from eitskin.frames.doctor.noise import MIN_UNTOUCHED, row_noise
 from eitskin.frames.doctor.report import FAULT, DoctorReport
 from eitskin.view.panel_texts import wrapped
 from eitskin.view.panels import check_picture, save_picture
@@ -55,7 +55,7 @@ def _reference(panel: Any, case: Case) -> None:
 
 
 def _gains(figure: Any, panel: Any, case: Case) -> None:
-    gain, strong = channel_gains(case)
+    gain, strong = row_gains(case)
     drives, drive = np.unique(case.rows[:, :2], axis=0, return_inverse=True)
     pairs, pair = np.unique(case.rows[:, 2:], axis=0, return_inverse=True)
     grid = np.full((len(drives), len(pairs)), np.nan)
@@ -93,14 +93,14 @@ def _reciprocity(panel: Any, case: Case) -> None:
 
 
 def _noise_or_change(panel: Any, case: Case) -> None:
-    quiet = case.frames.reference_voltage_v
-    if len(quiet) >= MIN_QUIET:
-        noise = 1e6 * channel_noise(np.nan_to_num(quiet))
+    untouched = case.frames.reference_voltage_v
+    if len(untouched) >= MIN_UNTOUCHED:
+        noise = 1e6 * row_noise(np.nan_to_num(untouched))
         panel.semilogy(np.maximum(noise, 1e-6), ".", color=MEASURED, markersize=4)
         median = float(np.median(noise[case.trusted])) if case.trusted.any() else 0.0
         panel.axhline(median, color=EXPECTED)
         panel.set(xlabel="row", ylabel="µV")
-        panel.set_title(f"Noise of {len(quiet)} untouched frames (line: median)")
+        panel.set_title(f"Noise of {len(untouched)} untouched frames (line: median)")
         return
     panel.set(xlabel="row", ylabel="mV", title="Change of each frame from the reference")
     for frame in case.frames.voltage_v[:20]:

@@ -54,12 +54,12 @@ def _batch(batch: Batch, frames: FloatArray) -> None:
         pass
 
 
-def _c_alone(blob: bytes, quiet: FloatArray, parts: list[FloatArray]) -> Callable[[], None]:
+def _c_alone(blob: bytes, untouched: FloatArray, parts: list[FloatArray]) -> Callable[[], None]:
     """One C call a thread: what the machine can give."""
     calls = []
     for part in parts:
         engine = CoreEngine(blob)
-        engine.set_reference(quiet[None])
+        engine.set_reference(untouched[None])
         calls.append(bare_block(engine, part))
 
     def run_all() -> None:
@@ -78,9 +78,9 @@ def run(frames: int, rounds: int, threads: Sequence[int]) -> BatchTimes:
     model, blob = load_prebuilt()
     *_, noisy = golden_session()
     many = np.tile(noisy, (-(-frames // len(noisy)), 1))[:frames]
-    quiet = model.golden.reference_v.astype(np.float64)
+    untouched = model.golden.reference_v.astype(np.float64)
     single = Reconstructor(model, blob=blob)
-    single.tare(quiet)
+    single.tare(untouched)
 
     def one_after_another() -> None:
         for frame in many:
@@ -90,9 +90,9 @@ def run(frames: int, rounds: int, threads: Sequence[int]) -> BatchTimes:
     ways: dict[tuple[str, int], Callable[[], Any]] = {("one after another", 1): one_after_another}
     for count in threads:
         batch = Batch(model, threads=count, blob=blob)
-        batch.tare(quiet)
+        batch.tare(untouched)
         ways["batch", count] = partial(_batch, batch, many)
-        ways["C alone", count] = _c_alone(blob, quiet, np.array_split(many, count))
+        ways["C alone", count] = _c_alone(blob, untouched, np.array_split(many, count))
     spent: dict[tuple[str, int], list[float]] = {way: [] for way in ways}
     used: dict[tuple[str, int], list[float]] = {way: [] for way in ways}
     for _ in range(rounds):

@@ -209,7 +209,7 @@ def _cost(
     options: Options = replace(default_options(model), warm_start=warm)
     blob = blobs[storage]
     done = run_frames(
-        program, folder, blob, session.quiet_v, session.frames_v, options, portable=portable
+        program, folder, blob, session.untouched_v, session.frames_v, options, portable=portable
     )
     each = np.sort([frame.instructions for frame in done.frames])
     return ConfigurationCost(

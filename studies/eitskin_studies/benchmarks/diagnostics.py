@@ -32,7 +32,7 @@ from eitskin_studies.benchmarks.diagnostics_faults import (
 from eitskin_studies.benchmarks.diagnostics_scenes import (
     IMPERFECT,
     PROTOCOL,
-    QUIET_FRAMES,
+    UNTOUCHED_FRAMES,
     CaseMaker,
     SceneCase,
     drawn,
@@ -139,7 +139,7 @@ class _Seen:
 
 
 class _Eye:
-    """Tares on quiet frames and judges what comes after, each frame as if it were the first."""
+    """Tares on untouched frames and judges what comes after, each frame as if it were the first."""
 
     def __init__(self) -> None:
         model, blob = load_prebuilt()
@@ -154,9 +154,9 @@ class _Eye:
     def truth(self, scene: TouchScene) -> BoolArray:
         return metrics.disc_mask(self._points, scene.centres_mm(), scene.radii_mm())
 
-    def tare(self, quiet_v: FloatArray) -> None:
+    def tare(self, untouched_v: FloatArray) -> None:
         self._solver.set_options(diagnostics=self._all)
-        self._solver.tare(quiet_v)
+        self._solver.tare(untouched_v)
 
     def look(self, frame_v: FloatArray, blind: bool = False) -> Reconstruction | None:
         """None where the frame is refused."""
@@ -204,9 +204,9 @@ def _frames(case: SceneCase, fault: InjectedFault, snr_db: float) -> FloatArray:
     return copied(reading, PROTOCOL) if fault.half else reading
 
 
-def _quiet(case: SceneCase, fault: InjectedFault, snr_db: float) -> FloatArray:
+def _untouched(case: SceneCase, fault: InjectedFault, snr_db: float) -> FloatArray:
     rest = case.volts["touched" if fault.lifted else "quiet"]
-    measured = case.measured(np.tile(rest, (QUIET_FRAMES, 1)), snr_db, "quiet")
+    measured = case.measured(np.tile(rest, (UNTOUCHED_FRAMES, 1)), snr_db, "quiet")
     return copied(measured, PROTOCOL) if fault.half else measured
 
 
@@ -217,7 +217,7 @@ def _look_at(
     truth = eye.truth(case.scene)
     for half, lifted in sorted({(fault.half, fault.lifted) for fault in faults}):
         of_kind = [fault for fault in faults if (fault.half, fault.lifted) == (half, lifted)]
-        eye.tare(_quiet(case, of_kind[0], snr_db))
+        eye.tare(_untouched(case, of_kind[0], snr_db))
         frame = _frames(case, InjectedFault(NONE, None, half=half), snr_db)
         clean = eye.see(frame, truth)
         judged_blind = snr_db == HEADLINE_DB and not lifted
@@ -314,7 +314,7 @@ def crowds(
         for snr_db in SNRS_DB:
             right, said = np.zeros(len(cases), dtype=np.bool_), np.zeros(len(cases), dtype=np.bool_)
             for k, case in enumerate(cases):
-                eye.tare(_quiet(case, FAULTS[0], snr_db))
+                eye.tare(_untouched(case, FAULTS[0], snr_db))
                 result = eye.look(_frames(case, FAULTS[0], snr_db))
                 if result is not None:
                     right[k] = len(result.touches) == count
@@ -341,11 +341,11 @@ def imperfect(
         said = {False: 0, True: 0}
         for k, scene in enumerate(scenes):
             effects = {"noise": {"snr_db": IMPERFECT_DB}} | IMPERFECT[effect]
-            volts = table.frames(k, scene, effects, quiet_frames=QUIET_FRAMES)
+            volts = table.frames(k, scene, effects, quiet_frames=UNTOUCHED_FRAMES)
             for half in said:
                 shown = copied(volts, PROTOCOL) if half else volts
-                eye.tare(shown[:QUIET_FRAMES])
-                result = eye.look(shown[QUIET_FRAMES])
+                eye.tare(shown[:UNTOUCHED_FRAMES])
+                result = eye.look(shown[UNTOUCHED_FRAMES])
                 said[half] += result is None or bool(
                     set(result.info.diagnostics_by_name) - {CROWDED}
                 )

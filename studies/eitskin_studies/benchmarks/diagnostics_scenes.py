@@ -25,7 +25,7 @@ from eitskin.skin.skin import paper_skin
 from eitskin_studies.harness.sessions import converter_for
 
 ROLE = "findings"  # keys the seeds of recorded results
-ELECTRODES, QUIET_FRAMES, RATE_HZ, BRIDGE_OHM = 16, 16, 20.0, 10.0
+ELECTRODES, UNTOUCHED_FRAMES, RATE_HZ, BRIDGE_OHM = 16, 16, 20.0, 10.0
 PROTOCOL = adjacent(ELECTRODES)
 ROWS = PROTOCOL.drive_measure.astype(np.int64)
 CONTACTS: dict[str, Any] = {"contact_impedance": {"spread": 0.2}}
@@ -117,8 +117,8 @@ class CaseMaker:
 
     def plain(self, number: int, scene: TouchScene) -> SceneCase:
         """A scene that nothing is wrong with."""
-        quiet, touched = self.frames(number, scene, {})
-        return SceneCase(self.seed, number, scene, {"quiet": quiet, "touched": touched})
+        untouched, touched = self.frames(number, scene, {})
+        return SceneCase(self.seed, number, scene, {"quiet": untouched, "touched": touched})
 
     def frames(
         self,
@@ -129,7 +129,8 @@ class CaseMaker:
         quiet_frames: int = 1,
         protocol: Protocol | None = None,
     ) -> FloatArray:
-        """Quiet and touched frames (quiet_frames + frames, m) V under contacts and ``effects``."""
+        """Untouched and touched frames (quiet_frames + frames, m) V under contacts and
+        ``effects``."""
         touches = [
             {"radius_mm": t.radius_mm, "x_mm": t.x_mm, "y_mm": t.y_mm, "contrast": t.contrast}
             for t in scene.touches

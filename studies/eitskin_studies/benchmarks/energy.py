@@ -138,9 +138,9 @@ class EnergyResult:
 def run(front: Front | None = None) -> EnergyResult:
     """From the shipped results of ``eitskin tradeoff run``, or ``front``."""
     where = Conditions()
-    told = (energy_of(point, where) for point in (front or load_front()).points)
+    reported = (energy_of(point, where) for point in (front or load_front()).points)
     return EnergyResult(
-        tuple(sorted((one for one in told if one is not None), key=lambda one: one.frame_mj))
+        tuple(sorted((one for one in reported if one is not None), key=lambda one: one.frame_mj))
     )
 
 

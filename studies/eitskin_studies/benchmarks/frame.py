@@ -56,7 +56,7 @@ def golden_session() -> tuple[
     rng = np.random.default_rng(SEED)
     reference = model.golden.reference_v.astype(np.float64)
     noise = np.sqrt(np.mean(reference**2)) * 1e-3
-    quiet = reference + noise * rng.standard_normal((64, len(reference)))
+    untouched = reference + noise * rng.standard_normal((64, len(reference)))
     frames = model.golden.frame_v + noise * rng.standard_normal((32, len(reference)))
     core, warm, portable = (
         CoreEngine(blob),
@@ -66,8 +66,8 @@ def golden_session() -> tuple[
     warm.set_options(replace(default_options(model), warm_start=True))
     numpy_engine = Reconstructor(model, engine="numpy")
     for engine in (core, warm, portable):
-        engine.set_reference(quiet)
-    numpy_engine.tare(quiet)
+        engine.set_reference(untouched)
+    numpy_engine.tare(untouched)
     return core, warm, portable, numpy_engine, frames
 
 

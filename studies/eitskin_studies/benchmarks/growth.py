@@ -150,10 +150,10 @@ def _ready(point: GrowthPoint, cache: Path) -> _Ready:
         [pixel_cover(model.grid, scene.centres_mm(), scene.radii_mm()) for scene in scenes]
     )
     changed = reference + cover @ jacobian.T * (1.2 * sheet)
-    quiet = reference + noise * rng.standard_normal((64, len(reference)))
+    untouched = reference + noise * rng.standard_normal((64, len(reference)))
     frames = changed + noise * rng.standard_normal(changed.shape)
     engine = CoreEngine(blob)
-    engine.set_reference(quiet)
+    engine.set_reference(untouched)
     engine.solve_frame(
         frames[0]
     )  # the first frame after a reference also builds the directions to ignore

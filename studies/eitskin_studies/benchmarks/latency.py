@@ -32,9 +32,9 @@ from eitskin_studies.harness.sections import Filling
 ROWS, ROW_US, DRIVES_A_FRAME = 208, 100.0, 16
 RATE_HZ = 1e6 / (ROWS * ROW_US)  # scans without a pause
 RISES_MS = (0, 30, 60, 120)
-QUIET_FRAMES = 64
+UNTOUCHED_FRAMES = 64
 HELD_S = 0.25  # fully pressed; and at least from lift to contact
-LINGER_S = 0.1  # after a lift a touch may still be told for so long
+LINGER_S = 0.1  # after a lift a touch may still be reported for so long
 REACH_MM = 60.0  # of contacts from the centre
 FALSE_MM = 20.0  # a touch farther off is a false one
 IN_SESSION = 50  # presses; each session takes a reference of its own
@@ -67,10 +67,10 @@ class Press:
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """What one frame or drive told: measured from ``began_s`` to ``ended_s`` on the scene's clock,
-    places of touches (k, 2) in mm, names of diagnostics; how long after it the packet was made, and
-    takes on the line. Where drives tell of touches, frames only tell of diagnostics."""
+class Reported:
+    """What one frame or drive reported: measured from ``began_s`` to ``ended_s`` on the scene's
+    clock, places of touches (k, 2) in mm, names of diagnostics; how long after it the packet was
+    made, and takes on the line. Where drives tell of touches, frames only tell of diagnostics."""
 
     began_s: float
     ended_s: float
@@ -83,10 +83,10 @@ class Told:
 
 @dataclass(frozen=True)
 class Judged:
-    """The presses of one rise: what was first told of each (``scan_ms``: from the contact to the
-    end of the scan, or drive, that told; ``later_ms``: from there until the packet was made);
-    presses with a false touch, how many those were, presses with a diagnostic, and whole frames
-    that were solved, and those with one."""
+    """The presses of one rise: what was first reported of each (``scan_ms``: from the contact to
+    the end of the scan, or drive, that reported it; ``later_ms``: from there until the packet was
+    made); presses with a false touch, how many those were, presses with a diagnostic, and whole
+    frames that were solved, and those with one."""
 
     method: str
     rise_ms: int
@@ -102,7 +102,7 @@ class Judged:
 
     @property
     def missed(self) -> int:
-        """Presses of which nothing was told while they lasted."""
+        """Presses of which nothing was reported while they lasted."""
         return self.presses - len(self.scan_ms)
 
 
@@ -140,8 +140,8 @@ def run(presses: int, emulated: int, seed: int, order: str = "") -> Latency:
                     own_seed = seed + 10_000 * rise_ms + first
                     count = min(IN_SESSION, presses - first)
                     drawn = draw(count, 1e-3 * rise_ms, own_seed)
-                    told = follow("sim", place, drawn, own_seed, model, REPORT[method])
-                    sessions.append((drawn, list(told)))
+                    reported = follow("sim", place, drawn, own_seed, model, REPORT[method])
+                    sessions.append((drawn, list(reported)))
                 judged.append(judge(name, rise_ms, sessions))
         parts = _parts(place, emulated, seed, order)
     rng = np.random.default_rng(seed)
@@ -150,8 +150,10 @@ def run(presses: int, emulated: int, seed: int, order: str = "") -> Latency:
     return Latency(tuple(judged), shown, whole, machine())
 
 
-def _named(method: str, judged: Judged, told: Sequence[Told], what: str) -> dict[str, FloatArray]:
-    found = [one for one in told if len(one.touches_mm)]
+def _named(
+    method: str, judged: Judged, reported: Sequence[Reported], what: str
+) -> dict[str, FloatArray]:
+    found = [one for one in reported if len(one.touches_mm)]
     return {
         f"scan, {method}": np.array(judged.scan_ms),
         f"{what}, {method}": np.array([one.solve_ms for one in found]),
@@ -164,12 +166,12 @@ def _parts(place: Path, emulated: int, seed: int, order: str) -> dict[str, Float
     parts: dict[str, FloatArray] = {}
     if emulated:
         drawn = draw(emulated, 0.03, seed + 1)
-        told = list(follow("emu", place, drawn, seed, None))
-        parts = _named(WHOLE, judge(WHOLE, 30, [(drawn, told)]), told, "solve")
+        reported = list(follow("emu", place, drawn, seed, None))
+        parts = _named(WHOLE, judge(WHOLE, 30, [(drawn, reported)]), reported, "solve")
         quick = draw(emulated, 0.03, seed + 2, QUICK_S)
-        told = list(follow("emu", place, quick, seed, _model(place, order), REPORT[DRIVES]))
-        judged = judge(DRIVES, 30, [(quick, told)])
-        parts |= _named(DRIVES, judged, told, "update")
+        reported = list(follow("emu", place, quick, seed, _model(place, order), REPORT[DRIVES]))
+        judged = judge(DRIVES, 30, [(quick, reported)])
+        parts |= _named(DRIVES, judged, reported, "update")
         parts[f"first update, {DRIVES}"] = np.array(judged.later_ms)
     steady = _written(place, "steady", draw(2, 0.0, seed), seed)
     return parts | {"host": host_times_ms(steady)}
@@ -218,7 +220,7 @@ def _written(place: Path, name: str, presses: Sequence[Press], seed: int) -> Pat
     written = place / f"{name}.toml"
     written.write_text(
         f'[scene]\nname = "{name}"\nskin = "paper"\nseed = {seed}\nrate_hz = {RATE_HZ!r}\n'
-        f"frames = {frames}\nquiet_frames = {QUIET_FRAMES}\n{''.join(touches)}"
+        f"frames = {frames}\nquiet_frames = {UNTOUCHED_FRAMES}\n{''.join(touches)}"
         "[effects.noise]\nsnr_db = 60.0\n[effects.contact_impedance]\nspread = 0.2\n",
         encoding="utf-8",
     )
@@ -232,11 +234,11 @@ def follow(
     seed: int,
     model: Path | None,
     report: str = "frame",
-) -> Iterator[Told]:
+) -> Iterator[Reported]:
     """What a board, "sim" or "emu", tells of ``presses``, frame by frame or drive by drive."""
     scene = _written(place, f"{board}-{len(presses)}", presses, seed)
     settings = SessionSettings(
-        mode=Stream.TOUCHES, tare=QUIET_FRAMES, model=model, every=1, report=report
+        mode=Stream.TOUCHES, tare=UNTOUCHED_FRAMES, model=model, every=1, report=report
     )
     with Session(f"{board}:{scene}", settings, observe=observe_scene) as session:
         session.start()
@@ -262,14 +264,14 @@ def follow(
             link_ms = 1e3 * sizes[0] * BITS_A_BYTE / BAUD
             if isinstance(item, DriveReport):
                 age_us = item.packet.head.age_us
-                yield Told(
+                yield Reported(
                     began_s, began_s + 2 * half_s, _places(item), (), age_us / 1e3, link_ms, False
                 )
             elif item.info is not None:
                 shown = _places(item) if report == "frame" else np.zeros((0, 2))
                 age_ms = item.info.age_us / 1e3
                 ended_s = began_s + scan_s
-                yield Told(began_s, ended_s, shown, item.diagnostics, age_ms, link_ms, True)
+                yield Reported(began_s, ended_s, shown, item.diagnostics, age_ms, link_ms, True)
 
 
 def _places(item: Frame | DriveReport) -> FloatArray:
@@ -277,19 +279,20 @@ def _places(item: Frame | DriveReport) -> FloatArray:
 
 
 def judge(
-    method: str, rise_ms: int, sessions: Sequence[tuple[Sequence[Press], Sequence[Told]]]
+    method: str, rise_ms: int, sessions: Sequence[tuple[Sequence[Press], Sequence[Reported]]]
 ) -> Judged:
-    """What was told of each press, session by session. False: a touch over ``FALSE_MM`` from the
-    press, a second one, one before the contact or over ``LINGER_S`` after the press has gone."""
+    """What was reported of each press, session by session. False: a touch over ``FALSE_MM`` from
+    the press, a second one, one before the contact or over ``LINGER_S`` after the press has
+    gone."""
     scans, errors, later, counts, diagnosed = [], [], [], [], 0
-    solved = [one for _, told in sessions for one in told if one.frame]
-    for presses, told in sessions:
+    solved = [one for _, reported in sessions for one in reported if one.frame]
+    for presses, reported in sessions:
         ends_s = [press.contact_s for press in presses[1:]] + [np.inf]
         at = 0
         for press, end_s in zip(presses, ends_s, strict=True):
             wrong, named, first = 0, False, None
-            while at < len(told) and told[at].ended_s < end_s:
-                one = told[at]
+            while at < len(reported) and reported[at].ended_s < end_s:
+                one = reported[at]
                 at += 1
                 away_mm = np.hypot(*(one.touches_mm - (press.x_mm, press.y_mm)).T)
                 begun = press.contact_s <= one.ended_s

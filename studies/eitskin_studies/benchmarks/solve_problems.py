@@ -94,7 +94,7 @@ def make_problems(name: str, model: Model, blob: bytes, session: Simulated) -> P
             engine.set_options(
                 bench_options(model, solver="active-set", sign=sign, iterations=1000)
             )
-            engine.set_reference(session.quiet_v)
+            engine.set_reference(session.untouched_v)
             result = engine.reconstruct(frame, touches=False)
             y, lam = engine.reduced_data()[: model.rank].astype(np.float64), result.info.lambda_
             if sign == "both":

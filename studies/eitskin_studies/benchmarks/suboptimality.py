@@ -96,7 +96,7 @@ def run(scenes: int, seed: int, progress: Progress) -> GapCurves:
 
 
 def _images(engine: CoreEngine, session: Simulated) -> tuple[FloatArray, FloatArray, list[int]]:
-    engine.set_reference(session.quiet_v)
+    engine.set_reference(session.untouched_v)
     images, coefficients, macs = [], [], []
     for frame in session.frames_v:
         engine.forget()

@@ -54,7 +54,7 @@ def add_gestures(what: Any) -> None:
     """``bench gestures``."""
     parser = what.add_parser(
         "gestures",
-        help="gestures of simulated fingers: how many are told rightly, and how late",
+        help="gestures of simulated fingers: how many are reported correctly, and how late",
         description=(
             "Draw sessions of taps, holds, swipes, pinches, spreads, turns, drags and presses,"
             " simulate a board that scans meanwhile, and judge what the C core tells."

@@ -33,10 +33,10 @@ class CoreMethod:
             f"eitskin {solver.options.iterations}, {'touches as discs' if painted else 'image'}"
         )
 
-    def learn(self, quiet_v: FloatArray) -> None:
-        """Reference and noise from quiet frames (q, m) in V."""
-        self._batch.tare(quiet_v)
-        self._reference, self._solved = np.asarray(quiet_v.mean(axis=0)), None
+    def learn(self, untouched_v: FloatArray) -> None:
+        """Reference and noise from untouched frames (q, m) in V."""
+        self._batch.tare(untouched_v)
+        self._reference, self._solved = np.asarray(untouched_v.mean(axis=0)), None
 
     def reconstruct(self, dv: FloatArray) -> FloatArray:
         """Images (k, n) of difference frames (k, m) in V: in S/m, or where painted the part of each
@@ -74,7 +74,7 @@ class CoreMethod:
 
     def _solve(self, dv: FloatArray) -> list[Reconstruction]:
         if self._reference is None:
-            raise UsageError(f"{self.name}: no quiet frames were given; call learn first")
+            raise UsageError(f"{self.name}: no untouched frames were given; call learn first")
         if self._solved is None or self._solved[0] is not dv:
             results = []
             for result in self._batch.each(self._reference + dv):

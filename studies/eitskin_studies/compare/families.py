@@ -1,9 +1,9 @@
 """What a method is: it makes images of difference frames; a family is a method and its one
 parameter.
 
-A method needs ``name`` and ``reconstruct``. Two things are optional: ``learn`` is given the quiet
-frames of a session before its difference frames, and ``touches`` finds positions by itself, where
-others have theirs read off the image.
+A method needs ``name`` and ``reconstruct``. Two things are optional: ``learn`` is given the
+untouched frames of a session before its difference frames, and ``touches`` finds positions by
+itself, where others have theirs read off the image.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,8 +36,8 @@ class Method(Protocol):
 class Learns(Protocol):
     """A method that wants to see the untouched skin first."""
 
-    def learn(self, quiet_v: FloatArray) -> None:
-        """Quiet frames (q, m) in V of the session whose difference frames (to their mean) come
+    def learn(self, untouched_v: FloatArray) -> None:
+        """Untouched frames (q, m) in V of the session whose difference frames (to their mean) come
         next."""
 
 

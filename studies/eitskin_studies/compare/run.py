@@ -286,7 +286,7 @@ def _run(
 
 def _images(method: Method, session: _Session, n_pixels: int) -> FloatArray:
     if isinstance(method, Learns):
-        method.learn(session.simulated.quiet_v)
+        method.learn(session.simulated.untouched_v)
     images = np.asarray(method.reconstruct(session.dv), dtype=np.float64)
     if images.shape != (len(session.dv), n_pixels) or not np.isfinite(images).all():
         raise UsageError(

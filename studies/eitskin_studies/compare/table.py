@@ -93,7 +93,7 @@ def header(comparison: Comparison) -> list[tuple[str, str]]:
             "measured",
             (
                 f"{converter}; contacts +-{100 * measured.contact_spread:g} %; "
-                f"reference is the mean of {measured.quiet_frames} quiet frames"
+                f"reference is the mean of {measured.quiet_frames} untouched frames"
             ),
         ),
         (

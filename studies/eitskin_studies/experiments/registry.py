@@ -12,7 +12,7 @@ EXPERIMENTS = {
         "single, double and triple touch by every method, at fixed parameters and at each one's"
         " best (Figs. 7, 8)"
     ),
-    "force": "loads at four radii, calibration, the smallest load that is detected (Figs. 9 to 11)",
+    "force": "weights at four radii, calibration, the smallest one detected (Figs. 9 to 11)",
     "multitouch": (
         "two to twelve touches: counts, positions, and when the core says that it cannot tell (Fig."
         " 12, Table 1)"

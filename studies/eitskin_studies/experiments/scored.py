@@ -45,7 +45,7 @@ def session_in_parts(
     exact_v = np.concatenate([part.exact_v for part in parts])
     first = parts[0]
     return FrameSession(
-        name, first.protocol, first.sheet_s_per_m, drawn, exact_v, first.exact_quiet_v
+        name, first.protocol, first.sheet_s_per_m, drawn, exact_v, first.exact_untouched_v
     )
 
 
@@ -79,22 +79,22 @@ class Evaluator:
         )
 
     def threshold(
-        self, scenes: Sequence[TouchScene], quiet_v: FloatArray, frames_v: FloatArray
+        self, scenes: Sequence[TouchScene], untouched_v: FloatArray, frames_v: FloatArray
     ) -> float:
         """t of the mask x > t max(x) with the best mean MIoU of these scenes; for sets of the
         tuning seed."""
-        results = reconstruct_many(self.model, frames_v, quiet_v, threads=1, touches=False)
+        results = reconstruct_many(self.model, frames_v, untouched_v, threads=1, touches=False)
         images = np.array([one.image for one in results], dtype=np.float64)
         return best_threshold(miou_curves(self.image_scorer, images, self.truths(scenes)))
 
     def scores(
-        self, scenes: Sequence[TouchScene], quiet_v: FloatArray, frames_v: FloatArray, t: float
+        self, scenes: Sequence[TouchScene], untouched_v: FloatArray, frames_v: FloatArray, t: float
     ) -> dict[str, list[Any]]:
         """Lists fit for JSON: a scene's image and disc MIoU, exact count, false touches, kMAC; of
         each true touch its scene and place, and the distance of the found one, None where it was
         missed; a scene's found touches [x, y, radius].
         """
-        results = reconstruct_many(self.model, frames_v, quiet_v, threads=1)
+        results = reconstruct_many(self.model, frames_v, untouched_v, threads=1)
         truths = self.truths(scenes)
         images = np.array([one.image for one in results], dtype=np.float64)
         scored: dict[str, list[Any]] = {

@@ -1,1 +1,1 @@
-"""Random gestures of fingers on a skin: drawn, simulated, and told ones judged by the truth."""
+"""Random gestures of fingers on a skin: drawn, simulated, and reported ones judged by the truth."""

@@ -1,4 +1,4 @@
-"""``eitskin bench gestures``: gestures of simulated fingers, told by the C core and judged."""
+"""``eitskin bench gestures``: gestures of simulated fingers, reported by the C core and judged."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from eitskin.progress import Progress, silent
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.gestures.drawn import EACH, KINDS, NONE, draw_session
-from eitskin_studies.gestures.judged import GestureCount, judge, told_gestures
+from eitskin_studies.gestures.judged import GestureCount, judge, reported_gestures
 from eitskin_studies.gestures.simulated import ELEMENTS, RATE_HZ, Simulator, found_touches
 from eitskin_studies.harness.sections import Filling, Tabular, text_table
 
@@ -64,7 +64,7 @@ def run(settings: Settings, progress: Progress = silent) -> GestureBench:
         exact_v = simulator.exact_v(session, settings.seed)
         for snr, count in counts.items():
             frames = found_touches(skin, exact_v, snr, settings.seed, session.name)
-            count.add(judge(session, told_gestures(frames, Gestures())))
+            count.add(judge(session, reported_gestures(frames, Gestures())))
     return GestureBench(settings, counts)
 
 
@@ -83,12 +83,14 @@ def _facts(count: GestureCount) -> dict[str, Any]:
     return {
         "gestures": count.gestures,
         "right": count.right_gestures,
-        "told": count.told,
+        "told": count.reported,
         "invented": count.invented.total(),
         "late_ms_median": 1e3 * float(np.median(late)),
         "late_ms_most": 1e3 * float(np.max(late)),
         "within_50_ms": float(np.mean(late <= WITHIN_S)),
-        "taken_for": {f"{was}: {told}": n for (was, told), n in sorted(count.taken_for.items())},
+        "taken_for": {
+            f"{was}: {reported}": n for (was, reported), n in sorted(count.taken_for.items())
+        },
     }
 
 
@@ -109,7 +111,7 @@ def _summary(bench: GestureBench) -> Tabular:
         rows.append(
             (
                 f"{snr:g}", f"{count.gestures}", _share(count.right_gestures, count.gestures),
-                _share(count.invented.total(), count.told),
+                _share(count.invented.total(), count.reported),
                 f"{1e3 * np.median(late):.0f}", f"{1e3 * np.quantile(late, 0.99):.0f}",
                 f"{1e3 * late.max():.0f}", _share(within, len(late)),
                 _share(count.light_right[False], count.light[False]),
@@ -146,9 +148,9 @@ def _confusion(bench: GestureBench) -> Tabular:
     for kind in KINDS:
         row = [kind]
         for count in bench.counts.values():
-            wrong = [(n, told) for (was, told), n in count.taken_for.items() if was == kind]
+            wrong = [(n, reported) for (was, reported), n in count.taken_for.items() if was == kind]
             wrong.sort(key=lambda item: (-item[0], item[1]))
-            row.append("; ".join(f"{told} {n}" for n, told in wrong))
+            row.append("; ".join(f"{reported} {n}" for n, reported in wrong))
         rows.append(row)
     return ["what was done", *(f"{snr:g} dB: reported, times" for snr in bench.counts)], rows
 

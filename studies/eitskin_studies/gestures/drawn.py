@@ -1,6 +1,6 @@
 """Random gestures: who touches where and when, and what each amounts to.
 
-A session is a list of gestures with quiet time between them. Timing, place, speed, contrast and
+A session is a list of gestures with pauses between them. Timing, place, speed, contrast and
 radius of every finger are drawn; a gesture depends on (seed, role, session, its number) only.
 """
 
@@ -69,7 +69,7 @@ class DrawnGesture:
 
     @property
     def is_gesture(self) -> bool:
-        """Whether anything but down, move and up may be told."""
+        """Whether anything but down, move and up may be reported."""
         return self.kind not in NONE
 
 

@@ -1,4 +1,4 @@
-"""Told events against what was done: right, invented, and how late."""
+"""Reported events against what was done: right, invented, and how late."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -9,7 +9,7 @@ from eitskin.core.gestures_table import EventKind, EventPhase
 from eitskin_studies.gestures.drawn import DrawnGesture, DrawnSession
 from eitskin_studies.gestures.simulated import RATE_HZ, TouchedFrame
 
-# of a gesture: what must be told, in this order
+# of a gesture: what must be reported, in this order
 EXPECTED = {
     "tap": ("tap",),
     "double-tap": ("tap", "double-tap"),
@@ -26,9 +26,9 @@ MAX_TURN_DEG = 30.0  # of a swipe's direction from the true one
 
 
 @dataclass(frozen=True)
-class ToldGesture:
-    """A gesture as it was told: ``first_s`` when it was recognised, ``last_s`` when its end was
-    told, both at the end of the scan that showed it."""
+class ReportedGesture:
+    """A gesture as it was reported: ``first_s`` when it was recognised, ``last_s`` when its end was
+    reported, both at the end of the scan that showed it."""
 
     kind: str
     first_s: float
@@ -39,13 +39,13 @@ class ToldGesture:
 @dataclass
 class GestureCount:
     """Of one session or of several added up: ``done`` gestures of each kind, ``right`` ones,
-    ``invented`` ones that no gesture accounts for, ``told`` in all, gestures by whether a finger is
-    light, what was taken for what, and the latency in s of each right one."""
+    ``invented`` ones that no gesture accounts for, ``reported`` in all, gestures by whether a
+    finger is light, what was taken for what, and the latency in s of each right one."""
 
     done: Counter[str] = field(default_factory=Counter)
     right: Counter[str] = field(default_factory=Counter)
     invented: Counter[str] = field(default_factory=Counter)
-    told: int = 0
+    reported: int = 0
     light: Counter[bool] = field(default_factory=Counter)
     light_right: Counter[bool] = field(default_factory=Counter)
     taken_for: Counter[tuple[str, str]] = field(default_factory=Counter)
@@ -66,7 +66,7 @@ class GestureCount:
         self.done += other.done
         self.right += other.right
         self.invented += other.invented
-        self.told += other.told
+        self.reported += other.reported
         self.light += other.light
         self.light_right += other.light_right
         self.taken_for += other.taken_for
@@ -74,26 +74,26 @@ class GestureCount:
             self.late_s.setdefault(kind, []).extend(late)
 
 
-def told_gestures(frames: Iterable[TouchedFrame], gestures: Gestures) -> list[ToldGesture]:
+def reported_gestures(frames: Iterable[TouchedFrame], gestures: Gestures) -> list[ReportedGesture]:
     """What ``gestures`` makes of the frames."""
-    told: list[ToldGesture] = []
+    reported: list[ReportedGesture] = []
     for frame in frames:
         now_s = frame.time_us * 1e-6 + 1 / RATE_HZ
         for event in gestures.update(frame.touches, frame.time_us):
             if event.phase == EventPhase.BEGIN:
-                told.append(ToldGesture(event.name, now_s, float("inf"), 0.0))
+                reported.append(ReportedGesture(event.name, now_s, float("inf"), 0.0))
             elif event.phase == EventPhase.END:
-                k = max(i for i, one in enumerate(told) if one.kind == event.name)
-                told[k] = ToldGesture(event.name, told[k].first_s, now_s, 0.0)
+                k = max(i for i, one in enumerate(reported) if one.kind == event.name)
+                reported[k] = ReportedGesture(event.name, reported[k].first_s, now_s, 0.0)
             elif event.phase == EventPhase.ONCE and event.kind > EventKind.UP:
-                told.append(ToldGesture(event.name, now_s, now_s, event.direction_deg))
-    return told
+                reported.append(ReportedGesture(event.name, now_s, now_s, event.direction_deg))
+    return reported
 
 
-def judge(session: DrawnSession, told: Sequence[ToldGesture]) -> GestureCount:
-    """Each told gesture belongs to the gesture in whose time it was recognised. A gesture is right
-    where exactly what is expected was told, and a swipe's direction fits."""
-    count, rest = GestureCount(told=len(told)), list(told)
+def judge(session: DrawnSession, reported: Sequence[ReportedGesture]) -> GestureCount:
+    """Each reported gesture belongs to the gesture in whose time it was recognised. A gesture is
+    right where exactly what is expected was reported, and a swipe's direction fits."""
+    count, rest = GestureCount(reported=len(reported)), list(reported)
     for one in session.gestures:
         mine = [t for t in rest if one.start_s <= t.first_s <= _until(one) + SLACK_S]
         rest = [t for t in rest if t not in mine]
@@ -124,8 +124,8 @@ def _end(one: DrawnGesture) -> float:
     return one.start_s + HOLD_US * 1e-6 if one.kind == "hold" else one.end_s
 
 
-def _fits(one: DrawnGesture, told: ToldGesture) -> bool:
+def _fits(one: DrawnGesture, reported: ReportedGesture) -> bool:
     if one.direction_deg is None:
         return True
-    off = (told.direction_deg - one.direction_deg + 180) % 360 - 180
+    off = (reported.direction_deg - one.direction_deg + 180) % 360 - 180
     return abs(off) <= MAX_TURN_DEG

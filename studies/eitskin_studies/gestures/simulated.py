@@ -105,17 +105,17 @@ def found_touches(
     noise_v = noise_deviation_v(exact_v[0], snr_db)
     span_v = Measurement.adc_headroom * float(np.abs(exact_v[0]).max())
     converter = (noise_v, 2 * span_v / 2**12, span_v, seed)
-    quiet = np.tile(exact_v[0], (Measurement.quiet_frames, 1))
-    quiet_v, _ = measure(quiet, *converter, f"quiet gestures {name}")
+    tare_v = np.tile(exact_v[0], (Measurement.quiet_frames, 1))
+    untouched_v, _ = measure(tare_v, *converter, f"quiet gestures {name}")
     frames_v, _ = measure(exact_v[1:], *converter, f"gestures {name}")
     skin.set_options(tracking(default_options(skin.model)))
-    skin.tare(quiet_v)
+    skin.tare(untouched_v)
     skin.forget()
-    told = []
+    reported = []
     for number, frame in enumerate(frames_v):
         try:
             touches = skin.reconstruct(frame).touches
         except FrameError:
             touches = ()
-        told.append(TouchedFrame(round(number * 1e6 / RATE_HZ), touches))
-    return told
+        reported.append(TouchedFrame(round(number * 1e6 / RATE_HZ), touches))
+    return reported

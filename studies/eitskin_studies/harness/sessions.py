@@ -42,16 +42,16 @@ class Drift:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredFrames:
-    """What a configuration gets: ``quiet_v`` (q, m), and ``frames_v`` (k, h, m): scene k held for h
-    frames, the last judged."""
+    """What a configuration gets: ``untouched_v`` (q, m), and ``frames_v`` (k, h, m): scene k held
+    for h frames, the last judged."""
 
-    quiet_v: FloatArray
+    untouched_v: FloatArray
     frames_v: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class FrameSession:
-    """A set's scenes, solved: ``exact_v`` (k, m) and ``exact_quiet_v`` (m,) V without noise and
+    """A set's scenes, solved: ``exact_v`` (k, m) and ``exact_untouched_v`` (m,) V without noise and
     converter."""
 
     name: str
@@ -59,7 +59,7 @@ class FrameSession:
     sheet_s_per_m: float
     touches: TouchSet
     exact_v: FloatArray
-    exact_quiet_v: FloatArray
+    exact_untouched_v: FloatArray
 
     @property
     def scenes(self) -> int:
@@ -98,17 +98,22 @@ class FrameSession:
 
     def _measure(self, snr_db: float, samples: int, scan: str, held: int) -> MeasuredFrames:
         how = converter_for(snr_db)
-        role, seed, quiet = self.touches.role, self.touches.seed, self.exact_quiet_v
-        noise_v = noise_deviation_v(quiet, snr_db, samples)
-        span_v = how.adc_headroom * float(np.abs(quiet).max())
+        role, seed, untouched = self.touches.role, self.touches.seed, self.exact_untouched_v
+        noise_v = noise_deviation_v(untouched, snr_db, samples)
+        span_v = how.adc_headroom * float(np.abs(untouched).max())
         lsb_v = 0.0 if how.adc_bits is None else 2 * span_v / 2**how.adc_bits
         converter = (noise_v, lsb_v, span_v, seed)
-        quiet_v, _ = measure(np.tile(quiet, (how.quiet_frames, 1)), *converter, f"quiet {role}")
+        untouched_v, _ = measure(
+            np.tile(untouched, (how.quiet_frames, 1)), *converter, f"quiet {role}"
+        )
         names = [*(f"frame {role}, held {h}" for h in range(held - 1)), f"frame {role}"]
         frames_v = np.stack([measure(self.exact_v, *converter, name)[0] for name in names], axis=1)
         if scan == "reciprocal":
-            quiet_v, frames_v = copied(quiet_v, self.protocol), copied(frames_v, self.protocol)
-        return MeasuredFrames(quiet_v, frames_v)
+            untouched_v, frames_v = (
+                copied(untouched_v, self.protocol),
+                copied(frames_v, self.protocol),
+            )
+        return MeasuredFrames(untouched_v, frames_v)
 
 
 def converter_for(snr_db: float) -> Measurement:
@@ -195,7 +200,7 @@ class SceneSolver:
     def _solve(
         self, name: str, drawn: TouchSet, progress: Progress, drift: Drift | None
     ) -> FloatArray:
-        """The quiet frame, then one a scene: (1 + k, m)."""
+        """The untouched frame, then one a scene: (1 + k, m)."""
         mesh, skin, sheet, seed = self.mesh, self.skin, self.skin.conductivity_s_per_m, drawn.seed
         spread = (
             stream(seed, f"contact {drawn.role}").uniform(-1.0, 1.0, skin.electrodes.count)

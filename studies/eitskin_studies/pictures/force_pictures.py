@@ -1,5 +1,5 @@
-"""Pictures of the force study: readings over load, errors over the skin, the smallest load over the
-SNR."""
+"""Pictures of the force study: readings over weight, errors over the skin, the smallest weight over
+the SNR."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from eitskin.arrays import FloatArray
 from eitskin.skin.skin import Skin
 from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, RIM, STYLE, load_matplotlib
-from eitskin_studies.experiments.force.law import LOADS_G
+from eitskin_studies.experiments.force.law import WEIGHTS_G
 from eitskin_studies.experiments.force.readouts import INTEGRAL, PEAK, TOUCH
 from eitskin_studies.experiments.force.scenes import RADIUS_SHARES
 
@@ -28,7 +28,7 @@ SHOWN = ((PEAK, "peak (S/m)"), (INTEGRAL, "integral (S/m mm²)"), (TOUCH, "stren
 
 
 def draw_curves(path: Path, curves: dict[str, ForceCurves]) -> None:
-    """Readings over load at the four radii, three readouts side by side, with 90 % bands over the
+    """Readings over weight at the four radii, three readouts side by side, with 90 % bands over the
     laws.
 
     Raises:
@@ -43,11 +43,13 @@ def draw_curves(path: Path, curves: dict[str, ForceCurves]) -> None:
             low, high = np.nanquantile(one.bands, [0.05, 0.95], axis=0)
             for radius, (colour, where) in enumerate(zip(COLOURS, NAMES, strict=True)):
                 axes.fill_between(
-                    LOADS_G, low[radius], high[radius], color=colour, alpha=0.13, linewidth=0
+                    WEIGHTS_G, low[radius], high[radius], color=colour, alpha=0.13, linewidth=0
                 )
-                axes.plot(LOADS_G, one.mean[radius], "o-", color=colour, label=where, markersize=4)
+                axes.plot(
+                    WEIGHTS_G, one.mean[radius], "o-", color=colour, label=where, markersize=4
+                )
             axes.set_title(name)
-            axes.set_xlabel("load (g)")
+            axes.set_xlabel("weight (g)")
             axes.set_ylabel(unit)
             axes.set_ylim(bottom=0)
             axes.grid(alpha=0.25)
@@ -92,7 +94,7 @@ def draw_skin(
             axes.set_aspect("equal")
             axes.set_axis_off()
             axes.set_title(
-                f"{name}\n{kind}, mean of {len(LOADS_G)} loads: {np.nanstd(errors, ddof=1):.1f} %"
+                f"{name}\n{kind}, mean of {len(WEIGHTS_G)} loads: {np.nanstd(errors, ddof=1):.1f} %"
             )
             if kind == "calibrated":
                 figure.colorbar(
@@ -102,7 +104,7 @@ def draw_skin(
 
 
 def draw_detection(path: Path, found: list[Detection]) -> None:
-    """The smallest load over the SNR at the four radii, with 95 % intervals.
+    """The smallest weight over the SNR at the four radii, with 95 % intervals.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -113,14 +115,14 @@ def draw_detection(path: Path, found: list[Detection]) -> None:
         figure = matplotlib.figure.Figure(figsize=(6.4, 4.4), layout="constrained")
         axes = figure.add_subplot()
         for radius, (colour, where) in enumerate(zip(COLOURS, NAMES, strict=True)):
-            told = np.array([(one.snr_db, *one.threshold(radius)) for one in found])
-            told = told[np.isfinite(told[:, 1])]
-            top = np.where(np.isfinite(told[:, 3]), told[:, 3], found[0].loads_g[-1])
-            bars = np.maximum([told[:, 1] - told[:, 2], top - told[:, 1]], 0)
-            snr_db = told[:, 0] + 0.5 * (radius - 1.5)  # side by side
+            reported = np.array([(one.snr_db, *one.threshold(radius)) for one in found])
+            reported = reported[np.isfinite(reported[:, 1])]
+            top = np.where(np.isfinite(reported[:, 3]), reported[:, 3], found[0].loads_g[-1])
+            bars = np.maximum([reported[:, 1] - reported[:, 2], top - reported[:, 1]], 0)
+            snr_db = reported[:, 0] + 0.5 * (radius - 1.5)  # side by side
             axes.errorbar(
                 snr_db,
-                told[:, 1],
+                reported[:, 1],
                 bars,
                 fmt="o-",
                 color=colour,
@@ -131,7 +133,7 @@ def draw_detection(path: Path, found: list[Detection]) -> None:
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(matplotlib.ticker.StrMethodFormatter("{x:g}"))
         axes.set_xlabel("SNR (dB)")
-        axes.set_ylabel("smallest load detected with probability 0.9 (g)")
+        axes.set_ylabel("smallest weight detected with probability 0.9 (g)")
         axes.grid(alpha=0.25, which="both")
         axes.legend(frameon=False, title="place")
         save_picture(figure, path)

@@ -254,11 +254,11 @@ def _trade(axes: Axes, ambiguities: Ambiguities) -> None:
         part = np.arange(1, len(exact) + 1) / len(exact)
         so_far = np.cumsum(exact) / np.arange(1, len(exact) + 1)
         axes.plot(part, so_far, color=colour, linewidth=1.2, label=f"score, {snr_db:g} dB")
-        quiet = [f for f in mine if not f.said]
-        if quiet:
+        untouched = [f for f in mine if not f.said]
+        if untouched:
             axes.plot(
-                len(quiet) / len(mine),
-                np.mean([f.exact for f in quiet]),
+                len(untouched) / len(mine),
+                np.mean([f.exact for f in untouched]),
                 "x",
                 color=colour,
                 markersize=7,

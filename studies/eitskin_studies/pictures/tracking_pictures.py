@@ -20,10 +20,10 @@ TRUE = "#c8c8c8"
 
 
 def draw_stream_told(
-    path: Path, stream: "TouchStream", told: Mapping[str, Sequence[Sequence[Touch]]], note: str
+    path: Path, stream: "TouchStream", reported: Mapping[str, Sequence[Sequence[Touch]]], note: str
 ) -> None:
     """x and y of every touch by frame, a colour an id, over the true places; a row of panels for
-    each way in ``told``.
+    each way in ``reported``.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -32,9 +32,9 @@ def draw_stream_told(
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 2.9 * len(told)))
-        axes = figure.subplots(len(told), 2, sharex=True, sharey=True, squeeze=False)
-        for row, (name, frames) in zip(axes, told.items(), strict=True):
+        figure = Figure(figsize=(9.6, 2.9 * len(reported)))
+        axes = figure.subplots(len(reported), 2, sharex=True, sharey=True, squeeze=False)
+        for row, (name, frames) in zip(axes, reported.items(), strict=True):
             for axis, coordinate in zip(row, ("x_mm", "y_mm"), strict=True):
                 for one in stream.samples:
                     place = np.where(one.there, getattr(one, coordinate), np.nan)

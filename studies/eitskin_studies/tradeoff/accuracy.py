@@ -51,8 +51,8 @@ class SolvedSet:
 def solve_session(
     one: Configuration, built: Built, session: FrameSession, snr_db: float
 ) -> SolvedSet:
-    """Tare on the session's quiet frames, then reconstruct each scene: cold, or warm where held for
-    some frames."""
+    """Tare on the session's untouched frames, then reconstruct each scene: cold, or warm where held
+    for some frames."""
     measured = session.measured(snr_db, one.samples, one.scan, one.held)
     return solve_frames(one, built, measured, session.touches.scenes)
 
@@ -62,7 +62,7 @@ def solve_frames(
 ) -> SolvedSet:
     """The same of measured frames."""
     solver = built.reconstructor(one)
-    solver.tare(measured.quiet_v)
+    solver.tare(measured.untouched_v)
     results, matchings = [], []
     for frames_v, scene in zip(measured.frames_v, scenes, strict=True):
         if not one.warm_start:

@@ -70,7 +70,7 @@ def count_instructions(
     even, costly = chosen_scenes(solved, spread, most)
     scenes = [*even, *(k for k in costly if k not in even)]
     frames = measured.frames_v[scenes].reshape(-1, measured.frames_v.shape[2])
-    found = _run(emulator, one, built, measured.quiet_v, frames)
+    found = _run(emulator, one, built, measured.untouched_v, frames)
     last = found[one.held - 1 :: one.held]
     if not one.warm_start:
         for k, row in zip(scenes, last, strict=True):
@@ -96,14 +96,14 @@ def count_instructions(
 
 
 def _run(
-    emulator: Emulator, one: Configuration, built: Built, quiet_v: Any, frames_v: Any
+    emulator: Emulator, one: Configuration, built: Built, untouched_v: Any, frames_v: Any
 ) -> tuple[EmulatedFrame, ...]:
     """What the emulated core says of each frame."""
     options = built.reconstructor(one).options
     with tempfile.TemporaryDirectory() as name:
         try:
             done = run_frames(
-                emulator.program.resolve(), Path(name), built.blob, quiet_v, frames_v, options
+                emulator.program.resolve(), Path(name), built.blob, untouched_v, frames_v, options
             )
         except UsageError as error:
             raise VerificationError(f"configuration {one.name!r}: {error}") from None

@@ -29,7 +29,7 @@ def host_times(
     for one, built, measured in entries:
         engine = CoreEngine(built.blob)
         engine.set_options(built.reconstructor(one).options)
-        engine.set_reference(measured.quiet_v)
+        engine.set_reference(measured.untouched_v)
         engines.append(engine)
     samples: list[list[list[float]]] = [[[] for _ in range(SCENES)] for _ in entries]
     for turn in progress(range(-1, rounds), "timing"):

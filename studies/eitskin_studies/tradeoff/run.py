@@ -354,7 +354,9 @@ def _peers(workspace: _Desk, skin: Skin, protocol: Protocol) -> list[dict[str, A
     if times is None:
         usual = Configuration("")
         measured = workspace.session(HEADLINE).measured(HEADLINE_DB, usual.samples, usual.scan, 1)
-        dv = np.array([frames_v[-1] for frames_v in measured.frames_v]) - measured.quiet_v.mean(0)
+        dv = np.array([frames_v[-1] for frames_v in measured.frames_v]) - measured.untouched_v.mean(
+            0
+        )
         times = workspace.store.put(facts, time_peers(skin, protocol, peers, dv, how.rounds))
     return [{**one, "host_us": us} for one, us in zip(peers, times, strict=True)]
 

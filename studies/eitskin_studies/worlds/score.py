@@ -41,8 +41,8 @@ class FoundTouch(Protocol):
 
 
 Finder = Callable[[FloatArray, FloatArray, float], Sequence[FoundTouch]]
-"""Touches of a frame (m,), given the quiet frames (q, m) of its session, in V, and a step of its
-converter, 0 without; it may raise FrameError."""
+"""Touches of a frame (m,), given the untouched frames (q, m) of its session, in V, and a step of
+its converter, 0 without; it may raise FrameError."""
 
 
 @dataclass(frozen=True)
@@ -88,24 +88,24 @@ class WorldScore:
 
 
 class CoreFinder:
-    """What ``solver`` finds: a tare on the quiet frames, then the frame, with nothing before it.
-    ``diagnostics`` names what the core finds wrong with the last frame."""
+    """What ``solver`` finds: a tare on the untouched frames, then the frame, with nothing before
+    it. ``diagnostics`` names what the core finds wrong with the last frame."""
 
     def __init__(self, solver: Reconstructor) -> None:
         self.solver, self._own_sign = solver, solver.options.sign
         self.diagnostics: tuple[str, ...] = ()
 
     def look_for(self, sign: str | None) -> None:
-        """Changes of ``sign`` from now on; None: as the solver was told at first."""
+        """Changes of ``sign`` from now on; None: as the solver was reported at first."""
         self.solver.set_options(sign=sign or self._own_sign)
 
     def __call__(
-        self, quiet_v: FloatArray, frame_v: FloatArray, step_v: float
+        self, untouched_v: FloatArray, frame_v: FloatArray, step_v: float
     ) -> tuple[Touch, ...]:
         """As ``Finder``; a board tells its step, too (``BoardInfo.noise_floor_v``)."""
         self.diagnostics = ()
         self.solver.set_options(noise_floor_v=step_v / math.sqrt(12))
-        self.solver.tare(quiet_v)
+        self.solver.tare(untouched_v)
         self.solver.forget()
         result = self.solver.reconstruct(frame_v)
         self.diagnostics = tuple(result.info.diagnostics_by_name)
@@ -118,7 +118,7 @@ def score_set(found_by: Finder, of: WorldScenes) -> WorldScore:
         found_by.look_for(of.world.sign)
     matchings, ratios, refused = [], [], 0
     warned: list[bool] = []
-    for scene, *measured in zip(of.scenes, of.quiet_v, of.frames_v, of.step_v, strict=True):
+    for scene, *measured in zip(of.scenes, of.untouched_v, of.frames_v, of.step_v, strict=True):
         try:
             found = found_by(*measured)
         except FrameError:

@@ -1,5 +1,5 @@
-"""Simulates sets of other worlds: for each scene a skin of its own, 64 quiet frames and one touched
-frame.
+"""Simulates sets of other worlds: for each scene a skin of its own, 64 untouched frames and one
+touched frame.
 
 One mesh of about 11,000 elements serves all (the model is made on another); misplaced electrodes
 and outlines out of round move its nodes. Each part is drawn from a stream of its own, named after
@@ -43,8 +43,8 @@ TRIES = 20_000
 
 @dataclass(frozen=True, eq=False)
 class WorldScenes:
-    """A set, simulated: scene k has ``quiet_v[k]`` (q, m) for its tare and ``frames_v[k]`` (m,), in
-    V.
+    """A set, simulated: scene k has ``untouched_v[k]`` (q, m) for its tare and ``frames_v[k]``
+    (m,), in V.
 
     ``scenes[k]`` holds its touches, ``step_v[k]`` a step of its converter, 0 without.
     """
@@ -52,7 +52,7 @@ class WorldScenes:
     name: str
     world: World
     scenes: tuple[TouchScene, ...]
-    quiet_v: FloatArray
+    untouched_v: FloatArray
     frames_v: FloatArray
     step_v: FloatArray
 
@@ -314,11 +314,11 @@ def _shaped(
 def _measured(
     exact_v: FloatArray, world: World, seed: int, role: str
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Quiet frames (k, q, m) and touched frames (k, m) with noise and converter, and its steps
+    """Untouched frames (k, q, m) and touched frames (k, m) with noise and converter, and its steps
     (k,)."""
     how = Measurement() if world.snr_db is None else converter_for(world.snr_db)
     bits = how.adc_bits if world.adc_bits is None else world.adc_bits
-    quiet, frames, steps = [], [], []
+    tares, frames, steps = [], [], []
     for k, (untouched, touched) in enumerate(exact_v):
         rms = float(np.sqrt((untouched**2).mean()))
         noise_v = 0.0 if world.snr_db is None else rms * 10 ** (-world.snr_db / 20)
@@ -326,7 +326,7 @@ def _measured(
         lsb_v = 2 * span_v / 2**bits if bits else 0.0
         many = np.vstack([np.tile(untouched, (how.quiet_frames, 1)), touched])
         noisy, _ = measure(many, noise_v, lsb_v, span_v, seed, f"{role} {k}")
-        quiet.append(noisy[:-1])
+        tares.append(noisy[:-1])
         frames.append(noisy[-1])
         steps.append(lsb_v)
-    return np.array(quiet), np.array(frames), np.array(steps)
+    return np.array(tares), np.array(frames), np.array(steps)

@@ -32,7 +32,7 @@ class TouchKinds:
 
 @dataclass(frozen=True)
 class Errors:
-    """What the model does not know of the skin, drawn for each scene anew. Standard deviations.
+    """What the model does not know of the skin, drawn again for each scene. Standard deviations.
 
     Attributes:
         contact_spread: each contact's impedance is the skin's times 1 + uniform(-s, s).

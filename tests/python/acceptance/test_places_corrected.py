@@ -31,8 +31,8 @@ def uncorrected(model: Model) -> Model:
 def found_mm(model: Model, engine: str, scenes: WorldScenes) -> list[np.ndarray]:
     """The touches' places of each scene, (k, 2)."""
     solver, places = Reconstructor(model, engine=engine), []
-    for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
-        solver.tare(quiet_v)
+    for untouched_v, frame_v in zip(scenes.untouched_v, scenes.frames_v, strict=True):
+        solver.tare(untouched_v)
         solver.forget()
         touches = solver.reconstruct(frame_v).touches
         places.append(np.array([(t.x_mm, t.y_mm) for t in touches]).reshape(-1, 2))
@@ -71,8 +71,8 @@ def test_the_core_corrects_by_the_polynomial_of_the_definition(factory):
     oracle = OracleEngine(model)
     found, off = found_mm(model, "c64", scenes), found_mm(uncorrected(model), "c64", scenes)
     assert max(np.abs(a - b).max() for a, b in zip(found, off, strict=True)) > 0.3
-    for quiet_v, one, other in zip(scenes.quiet_v, found, off, strict=True):
-        oracle.set_reference(quiet_v)
+    for untouched_v, one, other in zip(scenes.untouched_v, found, off, strict=True):
+        oracle.set_reference(untouched_v)
         assert oracle.reference is not None
         expected = [corrected(model, oracle.reference.log_gain, place) for place in other]
         assert one == pytest.approx(np.array(expected).reshape(-1, 2), abs=1e-3)

@@ -43,7 +43,7 @@ def test_the_scenes_are_what_they_should_be(simulated):
     counts = [len(scene.touches) for scene in simulated.touches.scenes]
     assert set(counts) == {1, 2, 3} and min(counts.count(k) for k in (1, 2, 3)) > 0.22 * len(counts)
     assert simulated.mesh_elements > 3 * prebuilt()[0].meta["mesh_elements"]
-    rms_v = np.sqrt(np.mean(simulated.exact_quiet_v**2))
+    rms_v = np.sqrt(np.mean(simulated.exact_untouched_v**2))
     assert 20 * np.log10(rms_v / simulated.noise_v) == pytest.approx(60)
 
 

@@ -35,19 +35,19 @@ some_and_all = pytest.mark.parametrize(
 # what an electrode costs differs from set to set: .024 here, .028 on the training set, .031 on a
 # third
 SEED = 78
-QUIET = 16
+UNTOUCHED = 16
 ELECTRODES = 16
 MAX_LOSS = 0.03
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A scene and its frames: quiet (q, m), whole (m,) and with electrode ``electrode`` off (m,),
-    volts."""
+    """A scene and its frames: untouched (q, m), whole (m,) and with electrode ``electrode`` off
+    (m,), volts."""
 
     scene: TouchScene
     electrode: int
-    quiet_v: FloatArray
+    untouched_v: FloatArray
     whole_v: FloatArray
     detached_v: FloatArray
 
@@ -65,7 +65,7 @@ def cases(count: int) -> tuple[Case, ...]:
         ]
         session = {
             "name": "one", "skin": "paper", "seed": 1000 * SEED + k, "frames": 2, "rate_hz": 20.0,
-            "quiet_frames": QUIET,
+            "quiet_frames": UNTOUCHED,
         }  # fmt: skip
         effects = {
             "detached": {"electrodes": [electrode], "from_s": 0.04},
@@ -74,8 +74,8 @@ def cases(count: int) -> tuple[Case, ...]:
         }
         table = {"scene": session, "touch": touches, "effects": effects}
         compiled = compile_scene(scene_from_table(table, "one", Path()), mesh_cache=mesh_cache)
-        *quiet, whole, detached = simulate_frames(compiled).voltage_v
-        made.append(Case(scene, electrode, np.array(quiet), whole, detached))
+        *untouched, whole, detached = simulate_frames(compiled).voltage_v
+        made.append(Case(scene, electrode, np.array(untouched), whole, detached))
     return tuple(made)
 
 
@@ -103,7 +103,7 @@ class LeftOutRows:
     def score(self, case: Case, frame_v: FloatArray, out: BoolArray) -> tuple[float, float]:
         """MIoU of the image's mask and of the touches' discs, with the rows ``out`` (m,) lost;
         twice the same frame, since the first makes the map."""
-        self.reconstructor.tare(case.quiet_v)
+        self.reconstructor.tare(case.untouched_v)
         frame_v = np.where(out, np.nan, frame_v)
         self.reconstructor.reconstruct(frame_v)
         self.reconstructor.forget()
@@ -171,14 +171,14 @@ def test_a_few_lost_rows_cost_next_to_nothing(left_out_rows, count):
 
 
 def test_no_touch_is_seen_where_there_is_none(left_out_rows):
-    """Quiet frames after the reference, an electrode's rows lost: as few pass the gate as with all
-    rows."""
+    """Untouched frames after the reference, an electrode's rows lost: as few pass the gate as with
+    all rows."""
     seen, core = {0: 0, 1: 0}, left_out_rows.reconstructor
     for case in cases(48):
-        core.tare(case.quiet_v[: QUIET - 4])
+        core.tare(case.untouched_v[: UNTOUCHED - 4])
         for electrodes in seen:
             out = rows_of(case.electrode) if electrodes else NONE_OUT
-            for frame_v in case.quiet_v[QUIET - 4 :]:
+            for frame_v in case.untouched_v[UNTOUCHED - 4 :]:
                 seen[electrodes] += bool(core.reconstruct(np.where(out, np.nan, frame_v)).touches)
     print(seen)
     assert seen[1] <= seen[0] + 3

@@ -228,7 +228,7 @@ def main(count: int, names: Sequence[str]) -> None:
     now = int(re.findall(r"VmSize:\s+(\d+)", Path("/proc/self/status").read_text())[0]) * 1024
     resource.setrlimit(resource.RLIMIT_AS, (now + MOST_BYTES, now + MOST_BYTES))
     signal.signal(signal.SIGPROF, too_long)
-    told = {}
+    reported = {}
     for name in names or FORMATS:
         file, make, read = FORMATS[name]
         draw, used, opened = np.random.default_rng(3), 0.0, 0
@@ -243,9 +243,9 @@ def main(count: int, names: Sequence[str]) -> None:
                 signal.setitimer(signal.ITIMER_PROF, 0)
                 print(f"{name}, file {k} of seed 3: {path}", file=sys.stderr)
                 raise
-        told[name] = {"files": count, "opened": opened, "longest_s": round(used, 2)}
+        reported[name] = {"files": count, "opened": opened, "longest_s": round(used, 2)}
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-    print(json.dumps({**told, "peak_mb": peak}))
+    print(json.dumps({**reported, "peak_mb": peak}))
 
 
 if __name__ == "__main__":

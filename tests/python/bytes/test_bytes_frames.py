@@ -126,12 +126,12 @@ TABLES = [TABLE, COLUMNS.encode(), b"# comment\n" + TABLE.replace(b",", b"\t") +
 @bounded(200)
 def test_any_text_table_is_frames_or_refused(tmp_path, content):
     path = written(tmp_path, "x.csv", content)
-    for quiet in (
+    for untouched in (
         {"reference_frames": "0"},
         {"reference_columns": "0"},
         {"reference_columns": "quiet"},
     ):
-        options = ImportOptions(SourceOptions(**quiet))
+        options = ImportOptions(SourceOptions(**untouched))
         frames = read_or_refuse(import_frames, path, options, PROTOCOL, None)
         assert frames is None or np.isfinite(frames.voltage_v).all()
     as_table = ImportOptions(SourceOptions(reference_frames="0"), table_file=str(path))

@@ -20,9 +20,9 @@ def test_each_is_read_or_refused_soon(count):
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
-    told = json.loads(done.stdout)
-    print(told)
-    peak_mb = told.pop("peak_mb")
-    assert len(told) == 9 and peak_mb > 0
-    for name, one in told.items():
+    reported = json.loads(done.stdout)
+    print(reported)
+    peak_mb = reported.pop("peak_mb")
+    assert len(reported) == 9 and peak_mb > 0
+    for name, one in reported.items():
         assert one["files"] == count and one["opened"] > 0, name  # damage that is not seen, too

@@ -6,7 +6,7 @@ import numpy.typing as npt
 from eitskin.calibration.presses import WeighedPresses
 
 RADIUS_MM = 97.0
-LOADS_N = np.array([0.5, 0.8, 1.0, 1.5, 2.0])
+FORCES_N = np.array([0.5, 0.8, 1.0, 1.5, 2.0])
 
 
 def saturating(force_n: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -29,10 +29,10 @@ def gain_of(place_mm: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 def presses(
     count: int = 24, noise: float = 0.01, bent: bool = True, seed: int = 3
 ) -> WeighedPresses:
-    """Every load at each of ``count`` places, with ``noise`` of the strength."""
-    place = np.repeat(places(count), len(LOADS_N), axis=0)
-    load = np.tile(LOADS_N, count)
-    scatter = np.exp(noise * np.random.default_rng(seed).standard_normal(len(load)))
+    """Every force at each of ``count`` places, with ``noise`` of the strength."""
+    place = np.repeat(places(count), len(FORCES_N), axis=0)
+    force = np.tile(FORCES_N, count)
+    scatter = np.exp(noise * np.random.default_rng(seed).standard_normal(len(force)))
     return WeighedPresses(
-        load, saturating(load) * scatter / (gain_of(place) if bent else 1.0), place
+        force, saturating(force) * scatter / (gain_of(place) if bent else 1.0), place
     )

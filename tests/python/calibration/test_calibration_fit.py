@@ -26,9 +26,9 @@ def test_a_known_law_and_gain_are_found():
     assert found.law.uncertainty == pytest.approx(uncertainty, rel=1e-6)
     assert found.notes == ()
     new = np.array([(10.0, -70.0), (-60.0, 20.0), (0.0, 0.0), (33.0, 44.0)])
-    load = np.array([0.6, 1.2, 1.7, 1.9])
-    told = found.law.forces_at(new, saturating(load) / gain_of(new))
-    assert told == pytest.approx(load, rel=0.02)
+    force = np.array([0.6, 1.2, 1.7, 1.9])
+    reported = found.law.forces_at(new, saturating(force) / gain_of(new))
+    assert reported == pytest.approx(force, rel=0.02)
 
 
 def test_a_flat_skin_needs_no_gain():
@@ -47,12 +47,12 @@ def test_powers_are_told_as_well(exponent):
 
 def test_the_table_is_the_law():
     law = calibrate(presses(noise=0.0), RADIUS_MM, resamples=0).law
-    load = np.linspace(0.02, 2.0, 50)
-    told = law.forces_at(np.zeros((50, 2)), saturating(load))
-    assert told == pytest.approx(load, rel=2e-3, abs=2e-4)
+    force = np.linspace(0.02, 2.0, 50)
+    reported = law.forces_at(np.zeros((50, 2)), saturating(force))
+    assert reported == pytest.approx(force, rel=2e-3, abs=2e-4)
     strong = np.array([1.02 * saturating(np.array(2.0)), 100.0, np.inf])
     beyond = law.forces_at(np.zeros((3, 2)), strong)
-    # the last slope, to twice the greatest load
+    # the last slope, to twice the greatest force
     assert beyond[0] > 2.0 and beyond[1] == beyond[2] == 4.0
 
 
@@ -79,8 +79,8 @@ def test_unlike_intervals_for_unlike_noise():
 
 
 def test_the_same_seed_gives_the_same():
-    told = [calibrate(presses(8), RADIUS_MM, seed=4, resamples=20).as_dict() for _ in range(2)]
-    assert told[0] == told[1]
+    reported = [calibrate(presses(8), RADIUS_MM, seed=4, resamples=20).as_dict() for _ in range(2)]
+    assert reported[0] == reported[1]
 
 
 ALIKE = r"1\.14 times the least, which cannot show a law; use a range of 1\.5 times or more"

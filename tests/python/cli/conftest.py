@@ -94,7 +94,7 @@ def done(capsys) -> Callable[..., str]:
 
 
 @pytest.fixture
-def told(done) -> Callable[..., Any]:
+def json_of(done) -> Callable[..., Any]:
     """What the command says with ``--json``, in JSON as the standard has it: NaN and Infinity are
     none."""
 

@@ -67,8 +67,8 @@ def folder(tmp_path_factory) -> Path:
     return path
 
 
-def test_presses_that_it_never_saw_read_their_load(folder, done, told):
-    said = told(f"reconstruct {folder / 'new.npz'} --model {folder / 'skin.eitm'}")
+def test_presses_that_it_never_saw_read_their_load(folder, done, json_of):
+    said = json_of(f"reconstruct {folder / 'new.npz'} --model {folder / 'skin.eitm'}")
     for frame, (place, grams) in zip(said["frames"], NEW, strict=True):
         (touch,) = frame["touches"]
         assert np.hypot(touch["x_mm"] - place[0], touch["y_mm"] - place[1]) < 1
@@ -78,9 +78,9 @@ def test_presses_that_it_never_saw_read_their_load(folder, done, told):
     assert "force g" not in done(f"reconstruct {folder / 'new.npz'}").splitlines()[0]
 
 
-def test_it_says_what_it_found(folder, done, told):
+def test_it_says_what_it_found(folder, done, json_of):
     arguments = ("calibrate", folder / "weights.npz", "--weights", folder / "weights.csv")
-    facts = told(*arguments)
+    facts = json_of(*arguments)
     model = load_model(folder / "skin.eitm")[0]
     assert (facts["presses"], facts["places"], facts["left_out"]) == (50, 10, [])
     assert model.meta["calibration"] == {key: facts[key] for key in model.meta["calibration"]}
@@ -109,18 +109,18 @@ def recorded(folder: Path, blob: bytes, path: Path) -> list[Frame]:
 
 def test_a_board_with_that_model_sends_the_same_load_bits(folder, tmp_path):
     live = recorded(folder, (folder / "skin.eitm").read_bytes(), tmp_path / "run.eits")
-    told = [
+    json_of = [
         t.force_n / NEWTONS_PER_GRAM
         for frame in live
         if frame.touches is not None
         for t in frame.touches
     ]
-    assert told == pytest.approx([grams for _, grams in NEW], rel=SOME)
+    assert json_of == pytest.approx([grams for _, grams in NEW], rel=SOME)
     check, _ = check_recording(tmp_path / "run.eits", folder / "skin.eitm")
     assert (check.touches, check.different) == (len(NEW), [])
 
 
-def test_a_recorded_run_calibrates_too(folder, tmp_path, told):
+def test_a_recorded_run_calibrates_too(folder, tmp_path, json_of):
     path, listed = tmp_path / "run.eits", tmp_path / "run.toml"
     live = recorded(folder, prebuilt()[1], path)
     tables = [
@@ -128,12 +128,12 @@ def test_a_recorded_run_calibrates_too(folder, tmp_path, told):
         for frame, ((x_mm, y_mm), grams) in zip(live, NEW, strict=True)
     ]
     listed.write_text("\n".join(tables))
-    facts = told(f"calibrate {path} --weights {listed}")
+    facts = json_of(f"calibrate {path} --weights {listed}")
     assert (facts["presses"], facts["places"], facts["gain_order"]) == (4, 4, 0)
     assert "4 places: the gain is taken to be the same everywhere" in facts["notes"][0]
     both = f"{path} {folder / 'weights.npz'}"
     lists = f"--weights {listed} --weights {folder / 'weights.csv'}"
-    assert told("calibrate", both, lists)["presses"] == 54
+    assert json_of("calibrate", both, lists)["presses"] == 54
 
 
 def test_weights_that_do_not_show_are_named(folder, tmp_path, ran):

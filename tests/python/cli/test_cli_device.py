@@ -93,11 +93,11 @@ def test_raw_lines_tell_of_the_scan(done, scene):
         ("--full", {"check_every": 1}),
     ],
 )
-def test_scan_options_reach_the_board(options, expected, done, told, scene, tmp_path):
+def test_scan_options_reach_the_board(options, expected, done, json_of, scene, tmp_path):
     """What a recording says of the board was asked after the scan was set."""
     run = tmp_path / "run.eits"
     done(f"record --device sim:{scene} -o {run} --frames 1", options)
-    board = told(f"info --device file:{run}")["board"]
+    board = json_of(f"info --device file:{run}")["board"]
     assert {name: board[name] for name in expected} == expected
 
 
@@ -151,7 +151,7 @@ def test_another_model_than_the_prebuilt_one(done, scene, tmp_path):
 # ---- a serial port ----
 
 
-def test_a_board_on_a_port(scene, ran, told):
+def test_a_board_on_a_port(scene, ran, json_of):
     with behind_a_port(board_of(scene)) as port:
         device = f"serial:{port}"
         out, err = ran(0, f"stream --device {device} --frames 3 -v")
@@ -165,7 +165,7 @@ def test_a_board_on_a_port(scene, ran, told):
         assert [line.split()[1] for line in out[0].splitlines()[1:4]] == 3 * ["-"]
         tared = json.loads(ran(0, f"tare --device {device} --frames 4 --json")[0])
         assert tared == {"device": device, "frames": 4, "tared": True}
-        facts = told(f"info --device {device}")
+        facts = json_of(f"info --device {device}")
         assert facts["board"]["tared"] == 1 and facts["statistics"]["frames_scanned"] >= 26
         assert facts["device"] == device
 
@@ -178,7 +178,7 @@ def test_a_slow_line_is_not_overrun(scene, ran):
     assert set(np.diff([frame["frame"] for frame in json_lines(out)[:-1]])) == {7}
 
 
-def test_devices_asks_only_what_looks_like_a_board(scene, done, told, monkeypatch, tmp_path):
+def test_devices_asks_only_what_looks_like_a_board(scene, done, json_of, monkeypatch, tmp_path):
     with behind_a_port(board_of(scene)) as path:
         found = [
             Port("/dev/ttyS0", "n/a"),
@@ -187,9 +187,9 @@ def test_devices_asks_only_what_looks_like_a_board(scene, done, told, monkeypatc
         ]
         monkeypatch.setattr("eitskin.device.open.ports", lambda: found)
         monkeypatch.setattr("eitskin.device.ports.ports", lambda: found)
-        listed = told("devices")
+        listed = json_of("devices")
         text = done("devices")
-        quiet = done("devices --quiet")
+        unasked = done("devices --quiet")
     by_path = {port["path"]: port for port in listed["ports"]}
     assert by_path[path]["board"]["board"] == "simulated" and by_path[path]["why"] is None
     assert by_path["/dev/ttyS0"]["board"] is by_path["/dev/ttyS0"]["why"] is None
@@ -198,7 +198,7 @@ def test_devices_asks_only_what_looks_like_a_board(scene, done, told, monkeypatc
     assert set(listed["urls"]) == urls
     assert f"serial:{path}  STM32 STLink, USB 0483:374b: simulated, firmware 0.1.0" in text
     assert "serial:/dev/ttyS0: not a board" in text
-    assert quiet.count("a board, not asked") == 2
+    assert unasked.count("a board, not asked") == 2
 
 
 def test_no_port_at_all(done, monkeypatch):
@@ -209,11 +209,11 @@ def test_no_port_at_all(done, monkeypatch):
 # ---- info, tare ----
 
 
-def test_info_of_a_simulated_board(done, told):
+def test_info_of_a_simulated_board(done, json_of):
     text = done("info --device sim:two_touch")
     assert "board       simulated" in text and "812 pixels, rank 64, f32" in text
     assert "reference   none; leave the skin untouched and run  eitskin tare" in text
-    facts = told("info --device sim:two_touch")
+    facts = json_of("info --device sim:two_touch")
     assert facts["board"]["protocol_hash"] == f"{prebuilt()[0].protocol.hash:016x}"
     found = set(facts["statistics"]["stages"])
     assert found == {"scan", "demodulate", "solve", "touches", "send", "frame"}
@@ -227,14 +227,14 @@ def test_tare(done, scene):
 # ---- model upload ----
 
 
-def test_model_upload(scene, tmp_path, ran, told):
+def test_model_upload(scene, tmp_path, ran, json_of):
     model = tmp_path / "small.eitm"
     model.write_bytes(small_blob())
     with behind_a_port(board_of(scene)) as port:
         to = f"--device serial:{port}"
-        facts = told(f"model upload {model} {to}")
+        facts = json_of(f"model upload {model} {to}")
         assert (facts["bank"], facts["bytes"]) == (1, len(small_blob()))
-        assert told(f"info {to}")["board"]["model_crc"] == facts["model_crc"]
+        assert json_of(f"info {to}")["board"]["model_crc"] == facts["model_crc"]
         # what needs its pixels now needs the file; touches are millimetres already
         said = ran(12, f"stream {to} --mode image --frames 1")[1]
         assert "needs the board's model" in said
@@ -284,11 +284,11 @@ def test_flash_prints_what_it_runs_and_runs_it(tmp_path, monkeypatch, ran):
 # ---- doctor ----
 
 
-def test_doctor_on_a_healthy_board(told, scene):
-    facts = told(f"doctor --device sim:{scene} --frames 8")
+def test_doctor_on_a_healthy_board(json_of, scene):
+    facts = json_of(f"doctor --device sim:{scene} --frames 8")
     assert facts["healthy"] and facts["source"] == f"sim:{scene}"
     assert facts["measured"]["quiet_frames"] == 8 and facts["measured"]["board_frames_scanned"] == 8
-    touched = told(f"doctor --device sim:{scene} --frames 6 --touch=-40,10,9")
+    touched = json_of(f"doctor --device sim:{scene} --frames 6 --touch=-40,10,9")
     assert touched["healthy"] and "numbering_by_touch" in touched["measured"]
 
 
@@ -309,10 +309,12 @@ def test_little_is_imported(command, names, imported):
     assert run_python(code).stdout.strip() == imported
 
 
-def test_frames_of_a_recording_give_the_boards_touches(done, told, scene, tmp_path):
+def test_frames_of_a_recording_give_the_boards_touches(done, json_of, scene, tmp_path):
     run, exported = tmp_path / "run.eits", tmp_path / "run.npz"
     done(f"record --device sim:{scene} -o {run}")
-    assert done(f"replay {run} --frames {exported}") == f"{exported}: {FRAMES} frames, 16 quiet\n"
+    assert (
+        done(f"replay {run} --frames {exported}") == f"{exported}: {FRAMES} frames, 16 untouched\n"
+    )
     frames = load_frames(exported)
     assert frames.n_frames == FRAMES and len(frames.reference_voltage_v) == 16
     assert np.allclose(frames.time_s, 0.05 * np.arange(FRAMES))
@@ -320,7 +322,7 @@ def test_frames_of_a_recording_give_the_boards_touches(done, told, scene, tmp_pa
     assert frames.protocol.hash == model.protocol.hash
     assert frames.meta["board"]["board"] == "simulated"
     board = json_lines(done(f"replay {run} --json"))[:-1]
-    host = told(f"reconstruct {exported} --track")["frames"]
+    host = json_of(f"reconstruct {exported} --track")["frames"]
     assert [[t["x_mm"] for t in f["touches"]] for f in host] == [
         [t["x_mm"] for t in f["touches"]] for f in board
     ]

@@ -71,20 +71,20 @@ def test_build_info_verify(
     kind,
     options,
     expected,
-    told,
+    json_of,
     tmp_path,
 ):
     skin, model = write_skin(tmp_path, outline, count, kind), tmp_path / "palm.eitm"
-    built = told(f"model build {skin} -o {model}", *QUICK, options)
+    built = json_of(f"model build {skin} -o {model}", *QUICK, options)
     assert tuple(built) == FACTS
-    assert told(f"model info {model}") == built
+    assert json_of(f"model info {model}") == built
     assert built == built | expected
     assert built["bytes"] == model.stat().st_size and built["skin"] == "palm"
     assert built["electrodes"] == count
     assert built["protocol_hash"] == f"{load_skin(skin)[1].hash:016x}"
     assert set(built["defaults"]) == set(asdict(Defaults()))
     assert load_model(model)[0].skin == load_skin(skin)[0]
-    verified = told(f"model verify {model}")
+    verified = json_of(f"model verify {model}")
     differences = verified["difference_to_golden_over_peak"]
     assert verified["ok"] is True and verified["model"] == str(model)
     assert differences["C float32"] == differences["C float32, portable"] == 0
@@ -94,20 +94,20 @@ def test_build_info_verify(
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["palm.eitm", "skin.toml"]
 
 
-def test_touch_change_and_regularisation_reach_the_model(told, tmp_path):
+def test_touch_change_and_regularisation_reach_the_model(json_of, tmp_path):
     skin, path = write_skin(tmp_path), tmp_path / "x.eitm"
-    facts = told(f"model build {skin} -o {path} --touch-change 2 --regularisation 0.1", *QUICK)
+    facts = json_of(f"model build {skin} -o {path} --touch-change 2 --regularisation 0.1", *QUICK)
     assert facts["defaults"]["touch_change_s_per_m"] == 0.04
     assert facts["lipschitz"] == pytest.approx(1 / 1.1, rel=2e-4)
 
 
-def test_the_prebuilt_model_for_people(done, told):
+def test_the_prebuilt_model_for_people(done, json_of):
     text = done("model info")
     assert "protocol hash    73aa164087184d25" in text and "rank             64" in text
     assert "defaults         iterations 60" in text
     text = done("model verify")
     assert text.count("the same bits") == 2 and "to the image by numpy" in text
-    facts = told("model info")
+    facts = json_of("model info")
     assert facts["bytes"] == len(prebuilt()[1]) and facts["pixels"] == 812
 
 

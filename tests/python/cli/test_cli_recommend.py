@@ -18,11 +18,11 @@ def scene(tmp_path) -> Path:
     return write_scene(tmp_path / "one.toml", frames=2, elements=900)
 
 
-def test_the_recommended_model_has_the_points_settings(told, tmp_path, monkeypatch):
+def test_the_recommended_model_has_the_points_settings(json_of, tmp_path, monkeypatch):
     """But for its model errors, of 300 random skins."""
     monkeypatch.setattr("eitskin.model.build.with_model_errors", lambda model, *_, **__: model)
     path = tmp_path / "model.eitm"
-    facts = told(f"recommend --budget 5ms -o {path}")
+    facts = json_of(f"recommend --budget 5ms -o {path}")
     assert facts["solve_us"] <= 5000 < facts["frame_us"] == facts["acquisition_us"] == 20_800
     assert facts["options"] == ["--samples 80", "--full"]
     model, _ = load_model(path)
@@ -35,20 +35,20 @@ def test_the_recommended_model_has_the_points_settings(told, tmp_path, monkeypat
     assert model.defaults.mask_threshold == pytest.approx(one.threshold)
 
 
-def test_recommendations_name_what_limits_the_rate(done, told):
+def test_recommendations_name_what_limits_the_rate(done, json_of):
     slow = done("recommend --accuracy 0.88 --board f767")
     assert "an estimate" in slow and "frames per second" in slow
     assert "measuring limits the rate" in done("recommend --budget 2ms")
     assert "host: solve and touches take" in done("recommend --budget 1ms --board host")
-    facts = told("recommend --budget 10ms --period 11ms")
+    facts = json_of("recommend --budget 10ms --period 11ms")
     assert facts["acquisition_us"] <= 11_000 and facts["configuration"]["scan"] == "reciprocal"
-    discs = told("recommend --budget 10ms --by discs")
+    discs = json_of("recommend --budget 10ms --by discs")
     assert discs["judged"].startswith("discs") and discs["accuracy"] > 0.9
 
 
 @pytest.mark.parametrize("board", ["f767", "host"])
-def test_presets_are_dearer_and_better_from_fast_to_accurate(told, board):
-    chosen = [told(f"recommend --preset {name} --board {board}") for name in PRESETS]
+def test_presets_are_dearer_and_better_from_fast_to_accurate(json_of, board):
+    chosen = [json_of(f"recommend --preset {name} --board {board}") for name in PRESETS]
     assert [one["accuracy"] for one in chosen] == sorted(one["accuracy"] for one in chosen)
     assert chosen[0]["report_us"] < 0.5 * chosen[2]["report_us"]
     assert chosen[0]["accuracy"] >= 0.84
@@ -72,8 +72,8 @@ def test_refusals(refused, code, arguments, said):
     assert said in refused(code, arguments)
 
 
-def test_reconstruct_with_a_preset(told, frames_file, ran):
-    usual = told(f"reconstruct {frames_file}")
+def test_reconstruct_with_a_preset(json_of, frames_file, ran):
+    usual = json_of(f"reconstruct {frames_file}")
     out, err = ran(0, f"reconstruct {frames_file} --preset accurate --json")
     fine = json.loads(out)
     assert "settings of" in err and fine["settings"]["rank"] == prebuilt()[0].rank

@@ -39,8 +39,8 @@ SUMMARY = {
 
 
 @pytest.mark.parametrize("engine", ["c", "c64"])
-def test_json(engine, told, frames_file):
-    facts = told(f"reconstruct {frames_file} --engine {engine}")
+def test_json(engine, json_of, frames_file):
+    facts = json_of(f"reconstruct {frames_file} --engine {engine}")
     found = facts["model"], facts["engine"], len(facts["frames"])
     assert found == ("prebuilt paper skin", engine, 20)
     for number, frame in enumerate(facts["frames"]):
@@ -59,11 +59,11 @@ def test_json(engine, told, frames_file):
     assert summary["miou_image"] > 0.8 and summary["miou_touches"] > 0.88
 
 
-def test_json_by_numpy(told, frames_file):
+def test_json_by_numpy(json_of, frames_file):
     """The same fields, and the touches of the core but for a confidence."""
     only = "--only test-s3-0,test-s3-1"
     ours, theirs = (
-        told(f"reconstruct {frames_file} --engine {engine} {only}") for engine in ("numpy", "c")
+        json_of(f"reconstruct {frames_file} --engine {engine} {only}") for engine in ("numpy", "c")
     )
     assert ours["engine"] == "numpy" and len(ours["frames"]) == 2
     for one, other in zip(ours["frames"], theirs["frames"], strict=True):
@@ -98,11 +98,11 @@ def test_what_is_found_is_said(done, frames_file, tmp_path, capsys):
     assert "diagnostics: electrode 5 open" in capsys.readouterr().out
 
 
-def test_what_it_says_is_what_the_reconstructor_does(told, frames_file):
-    facts = told(f"reconstruct {frames_file} --iterations 25 --sign both")
+def test_what_it_says_is_what_the_reconstructor_does(json_of, frames_file):
+    facts = json_of(f"reconstruct {frames_file} --iterations 25 --sign both")
     reconstructor = Reconstructor(*prebuilt()[:1], blob=prebuilt()[1])
     reconstructor.set_options(iterations=25, sign="both")
-    reconstructor.tare(session().quiet_v)
+    reconstructor.tare(session().untouched_v)
     for number in (0, 7, 19):
         reconstructor.forget()
         touches = reconstructor.reconstruct(session().frames_v[number]).touches
@@ -110,9 +110,9 @@ def test_what_it_says_is_what_the_reconstructor_does(told, frames_file):
         assert [(t["x_mm"], t["y_mm"]) for t in listed] == [(t.x_mm, t.y_mm) for t in touches]
 
 
-def test_threads_change_nothing(told, frames_file, ran):
+def test_threads_change_nothing(json_of, frames_file, ran):
     one, three = (
-        told(f"reconstruct {frames_file}", *threads) for threads in ((), ("--threads", "3"))
+        json_of(f"reconstruct {frames_file}", *threads) for threads in ((), ("--threads", "3"))
     )
     for frame in (*one["frames"], *three["frames"]):
         del frame["info"]["solve_us"], frame["info"]["touch_us"]
@@ -126,22 +126,22 @@ def test_threads_change_nothing(told, frames_file, ran):
         assert text in ran(2, f"reconstruct {frames_file}", *arguments)[1]
 
 
-def test_options_reach_the_solver(told, frames_file, changed_frames):
-    facts = told(f"reconstruct {frames_file} --gap 0.001 --iterations 5000")
+def test_options_reach_the_solver(json_of, frames_file, changed_frames):
+    facts = json_of(f"reconstruct {frames_file} --gap 0.001 --iterations 5000")
     assert {frame["info"]["stop"] for frame in facts["frames"]} == {"gap"}
     assert all(frame["info"]["gap_rel"] <= 0.001 for frame in facts["frames"])
     infos = {}
     for solver in SOLVERS:
-        facts = told(f"reconstruct {frames_file} --only test-s3-0 --solver {solver}")
+        facts = json_of(f"reconstruct {frames_file} --only test-s3-0 --solver {solver}")
         infos[solver] = facts["frames"][0]["info"]
     assert infos["working-set"]["macs"] < 0.25 * infos["fista"]["macs"]
     assert infos["active-set"]["stop"] == "optimum" and infos["active-set"]["gap_rel"] < 1e-5
-    facts = told(f"reconstruct {frames_file} --only test-s3-0 --mac-limit 200000")
+    facts = json_of(f"reconstruct {frames_file} --only test-s3-0 --mac-limit 200000")
     assert facts["frames"][0]["info"]["stop"] == "macs"
     assert facts["frames"][0]["info"]["macs"] <= 200000
     resting = changed_frames(voltage_v=np.repeat(session().frames_v[:1], 20, axis=0))
-    cold = told(f"reconstruct {resting} --iterations 10")["frames"]
-    warm = told(f"reconstruct {resting} --iterations 10 --warm")["frames"]
+    cold = json_of(f"reconstruct {resting} --iterations 10")["frames"]
+    warm = json_of(f"reconstruct {resting} --iterations 10 --warm")["frames"]
     assert (
         cold[0]["info"]["gap"]
         == warm[0]["info"]["gap"]
@@ -151,9 +151,9 @@ def test_options_reach_the_solver(told, frames_file, changed_frames):
     assert len({frame["touches"][0]["id"] for frame in warm}) == 1
     assert cold[5]["touches"][0]["id"] != cold[0]["touches"][0]["id"]
     limit = str(0.999 * np.abs(session().frames_v).max())
-    masked = told(f"reconstruct {frames_file} --saturation-v {limit}")
+    masked = json_of(f"reconstruct {frames_file} --saturation-v {limit}")
     assert max(frame["info"]["masked"] for frame in masked["frames"]) >= 1
-    some = told(f"reconstruct {frames_file} --only test-s3-4,test-s3-11")
+    some = json_of(f"reconstruct {frames_file} --only test-s3-4,test-s3-11")
     assert [frame["frame"] for frame in some["frames"]] == [4, 11]
     assert some["summary"]["frames"] == 2
 
@@ -169,22 +169,22 @@ def test_for_people(done, frames_file):
     assert sum(line.startswith("test-s3-") for line in lines) == 20
 
 
-def test_quiet_frames_show_nothing(done, told, changed_frames):
-    quiet = session().quiet_v
+def test_untouched_frames_show_nothing(done, json_of, changed_frames):
+    untouched = session().untouched_v
     names = np.array([f"q{k}" for k in range(8)])
-    given = {"voltage_v": quiet[:8], "reference_voltage_v": quiet[8:], "frame_name": names}
+    given = {"voltage_v": untouched[:8], "reference_voltage_v": untouched[8:], "frame_name": names}
     path = changed_frames(truth=False, **given)
     text = done(f"reconstruct {path}")
     assert text.count("none (no change above the noise)") >= 7
     assert "compared with the truth" not in text
-    facts = told(f"reconstruct {path}")
+    facts = json_of(f"reconstruct {path}")
     assert "summary" not in facts
     assert {frame["info"]["stop"] for frame in facts["frames"]} <= {"below-threshold", "iterations"}
 
 
-def test_output_and_picture(told, frames_file, tmp_path):
+def test_output_and_picture(json_of, frames_file, tmp_path):
     output, picture = tmp_path / "out.npz", tmp_path / "out.png"
-    facts = told(f"reconstruct {frames_file} -o {output} --picture {picture}")
+    facts = json_of(f"reconstruct {frames_file} -o {output} --picture {picture}")
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out.npz", "out.png"]
     assert picture.read_bytes()[:8] == PNG and picture.stat().st_size > 20_000
     with np.load(output, allow_pickle=False) as saved:
@@ -202,7 +202,7 @@ def test_a_bad_frame_among_good_ones(changed_frames, tmp_path, ran):
     out, err = ran(8, f"reconstruct {path} --json -o {output}")
     facts = json.loads(out)
     assert [frame["refused"] is None for frame in facts["frames"]].count(False) == 2
-    assert "too many channels" in facts["frames"][3]["refused"]
+    assert "too many rows" in facts["frames"][3]["refused"]
     assert "zero" in facts["frames"][5]["refused"]
     lines = err.splitlines()
     assert len(lines) == 2 and all(line.startswith(f"eitskin: {path}: frame ") for line in lines)
@@ -213,7 +213,7 @@ def test_a_bad_frame_among_good_ones(changed_frames, tmp_path, ran):
 def test_a_reference_of_another_skin_is_warned_of(changed_frames, ran):
     order = np.random.default_rng(1).permutation(208)
     path = changed_frames(
-        voltage_v=session().frames_v[:, order], reference_voltage_v=session().quiet_v[:, order]
+        voltage_v=session().frames_v[:, order], reference_voltage_v=session().untouched_v[:, order]
     )
     err = ran(0, f"reconstruct {path}")[1]
     assert err.startswith("eitskin: warning: the reference correlates with the model only by 0.")
@@ -221,7 +221,7 @@ def test_a_reference_of_another_skin_is_warned_of(changed_frames, ran):
     assert f"eitskin doctor {path}" in err
 
 
-def test_the_whole_way(done, told, tmp_path):
+def test_the_whole_way(done, json_of, tmp_path):
     """A description to a model to simulated frames to touches, with one's own skin: an L with 24
     electrodes."""
     skin_file = tmp_path / "hand.toml"
@@ -233,7 +233,7 @@ def test_the_whole_way(done, told, tmp_path):
     )
     model_file, frames_path = tmp_path / "hand.eitm", tmp_path / "frames.npz"
     done(f"model build {skin_file} -o {model_file} --samples 0")
-    assert told(f"model info {model_file}")["skin"] == "hand"
+    assert json_of(f"model info {model_file}")["skin"] == "hand"
     done(f"model verify {model_file}")
     skin, protocol = load_skin(skin_file)
     rules = TouchRules(count=(1, 2), radius_mm=(7, 10), gap_mm=20, rim_margin_mm=8)
@@ -242,7 +242,9 @@ def test_the_whole_way(done, told, tmp_path):
         simulate(skin, protocol, random_touches(skin.outline, 5, 12, rules=rules)).as_frames(),
     )
     output, picture = tmp_path / "out.npz", tmp_path / "out.png"
-    facts = told(f"reconstruct {frames_path} --model {model_file} -o {output} --picture {picture}")
+    facts = json_of(
+        f"reconstruct {frames_path} --model {model_file} -o {output} --picture {picture}"
+    )
     assert facts["model"] == str(model_file)
     summary = facts["summary"]
     assert summary["found"] >= 0.85 * summary["true"] and summary["false"] <= 2
@@ -268,13 +270,13 @@ def test_the_demo(tmp_path, ran):
     assert 0 < difference["C float32 to numpy"] < 1e-4 and difference["C float64 to numpy"] < 1e-9
 
 
-def test_tracked_frames_keep_ids_and_confirm_births(told, tmp_path):
+def test_tracked_frames_keep_ids_and_confirm_starts(json_of, tmp_path):
     """A finger that moves 2 mm a frame keeps one id; each frame by itself counts on."""
     moving = tuple(TouchScene(str(k), (Put(-20.0 + 2 * k, 30.0, 9.0, 5.0),)) for k in range(8))
     made = simulate(paper_skin(), adjacent(16), TouchSet("moving", 1, moving)).as_frames()
     save_frames(tmp_path / "moving.npz", made)
     alone, tracked = (
-        told(f"reconstruct {tmp_path / 'moving.npz'}", *more)["frames"]
+        json_of(f"reconstruct {tmp_path / 'moving.npz'}", *more)["frames"]
         for more in ((), ("--track",))
     )
     ids = [[touch["id"] for touch in frame["touches"]] for frame in tracked]
@@ -285,14 +287,14 @@ def test_tracked_frames_keep_ids_and_confirm_births(told, tmp_path):
     assert tracked[7]["touches"][0]["x_mm"] == pytest.approx(-6.0, abs=2.0)
 
 
-def test_frames_with_times_are_a_stream(told, tmp_path):
+def test_frames_with_times_are_a_stream(json_of, tmp_path):
     frames = session().as_frames()
     timed, alone = tmp_path / "timed.npz", tmp_path / "alone.npz"
     save_frames(timed, replace(frames, time_s=np.arange(frames.n_frames) / 48))
     save_frames(alone, frames)
 
     def touches(path: Path, *more: str) -> list[list[dict[str, float]]]:
-        facts = told(f"reconstruct {path}", *more)
+        facts = json_of(f"reconstruct {path}", *more)
         return [frame["touches"] for frame in facts["frames"]]
 
     assert touches(timed) == touches(alone, "--track") != touches(alone)

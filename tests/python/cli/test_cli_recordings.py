@@ -92,36 +92,36 @@ def test_gestures_of_a_recording_that_has_touches_alone(done, tmp_path):
     assert not any(line.split()[1].isdigit() for line in shown)
 
 
-def test_a_recording_is_a_device_too(done, told, run):
+def test_a_recording_is_a_device_too(done, json_of, run):
     shown, replayed = (
         done(f"{command}{run}").splitlines()[0]
         for command in ("stream -v --device file:", "replay -v ")
     )
     assert shown == replayed and ", off by " in shown
-    facts = told(f"info --device file:{run}")
+    facts = json_of(f"info --device file:{run}")
     sha256 = hashlib.sha256(load_prebuilt()[1]).hexdigest()
     assert facts["statistics"] is None and facts["sha256"] == {"model": sha256, "firmware": None}
     assert sha256 in done(f"info --device file:{run}")
-    assert told(f"doctor --device file:{run}")["measured"]["quiet_frames"] == 16
+    assert json_of(f"doctor --device file:{run}")["measured"]["quiet_frames"] == 16
 
 
-def test_record_says_how_much(told, scene, tmp_path):
+def test_record_says_how_much(json_of, scene, tmp_path):
     path = tmp_path / "run.eits"
-    facts = told(f"record --device sim:{scene} -o {path} --frames 3")
+    facts = json_of(f"record --device sim:{scene} -o {path} --frames 3")
     assert facts["frames"] == 3 and facts["bytes"] >= path.stat().st_size > 10_000
     assert facts["packets"] == sum(p.type not in (PacketType.RECORDING,) for p in packets(path)) - 1
     assert len([p for p in packets(path) if p.type == PacketType.RAW]) == 16 + 3
-    again = told(f"record --device sim:{scene} -o {path} --seconds 0.1 --overwrite")
+    again = json_of(f"record --device sim:{scene} -o {path} --seconds 0.1 --overwrite")
     assert again["frames"] == 3
 
 
 # ---- the same bits ----
 
 
-def test_the_hosts_images_are_the_boards(done, told, run):
+def test_the_hosts_images_are_the_boards(done, json_of, run):
     found = done(f"replay {run} --check")
     assert found == f"same bits: yes, {FRAMES} images and the touches of {FRAMES} frames\n"
-    facts = told(f"replay {run} --check")
+    facts = json_of(f"replay {run} --check")
     assert facts["same_bits"] and facts["solver_noted"]
     assert (facts["same"], facts["inconclusive"]) == (FRAMES, 0)
 
@@ -130,10 +130,10 @@ def test_the_hosts_images_are_the_boards(done, told, run):
     "options",
     ["--cold", "--no-track", "--iterations 9", "--sign both", "--tare 1", "--reciprocal 0"],
 )
-def test_whatever_the_solver_was_told(options, done, told, scene, tmp_path):
+def test_whatever_the_solver_was_told(options, done, json_of, scene, tmp_path):
     path = tmp_path / "run.eits"
     done(f"record --device sim:{scene} -o {path}", *QUIETLY, options)
-    assert told(f"replay {path} --check")["same"] == FRAMES
+    assert json_of(f"replay {path} --check")["same"] == FRAMES
 
 
 @pytest.mark.parametrize(
@@ -165,20 +165,21 @@ def lost(run: Path, target: Path, number: int = 16 + 1) -> Path:
     ("how", "same"), [("--warm", 1), ("", None), ("--no-track", FRAMES - 1)],
     ids=["warm", "tracked", "each by itself"],
 )  # fmt: skip
-def test_frames_after_a_loss_are_not_called_different(how, same, done, told, scene, tmp_path):
+def test_frames_after_a_loss_are_not_called_different(how, same, done, json_of, scene, tmp_path):
     """A warm solve begins from the last one, and touches that are followed in time began from the
     frame that is lost: the host's have other bits and nobody's fault it is. Without tracking, every
     frame can be judged."""
     run = tmp_path / "run.eits"
     done(f"record --device sim:{scene} -o {run}", how)
-    facts = told(f"replay {lost(run, tmp_path / 'other.eits')} --check")
+    facts = json_of(f"replay {lost(run, tmp_path / 'other.eits')} --check")
     assert facts["different"] == [] and facts["alone"] == 1
     assert facts["same"] + facts["inconclusive"] == FRAMES - 1
     assert same in (None, facts["same"]) and (facts["inconclusive"] > 0) == (how != "--no-track")
 
 
 def test_an_image_after_a_loss_is_judged_all_the_same(run, tmp_path, ran):
-    """Tracking changes touches only: an image that differs is told, whatever was lost before."""
+    """Tracking changes touches only: an image that differs is reported, whatever was lost
+    before."""
     image = nth(PacketType.IMAGE, 3, flipped(SOLVED_HEAD + 4 * 400))
     other = changed(lost(run, tmp_path / "lost.eits"), tmp_path / "other.eits", image)
     assert len(json.loads(ran(10, f"replay {other} --check --json")[0])["different"]) == 1
@@ -189,11 +190,13 @@ def test_a_loss_in_the_tare_leaves_nothing_to_compare(run, tmp_path, ran):
     assert "nothing to compare" in ran(8, f"replay {other} --check")[1]
 
 
-def test_without_its_note_the_models_own_options_are_taken(done, told, scene, run, tmp_path, ran):
+def test_without_its_note_the_models_own_options_are_taken(
+    done, json_of, scene, run, tmp_path, ran
+):
     def unnoted(run: Path, name: str) -> Path:
         return changed(run, tmp_path / name, nth(PacketType.RECORDING, 1, lambda payload: None))
 
-    facts = told(f"replay {unnoted(run, 'plain.eits')} --check")
+    facts = json_of(f"replay {unnoted(run, 'plain.eits')} --check")
     assert facts["same"] == FRAMES and not facts["solver_noted"]
     odd = tmp_path / "odd.eits"
     done(f"record --device sim:{scene} -o {odd}", *QUIETLY, "--iterations 5")
@@ -204,13 +207,13 @@ def test_without_its_note_the_models_own_options_are_taken(done, told, scene, ru
 # ---- export ----
 
 
-def test_rows_that_could_not_be_measured_are_not_exported(done, told, run, tmp_path):
+def test_rows_that_could_not_be_measured_are_not_exported(done, json_of, run, tmp_path):
     def with_nan(payload: bytes) -> bytes:
         return payload[:RAW_HEAD] + np.float32(np.nan).tobytes() + payload[RAW_HEAD + 4 :]
 
     other = changed(run, tmp_path / "other.eits", nth(PacketType.RAW, 16 + 3, with_nan))
     exported = tmp_path / "run.npz"
-    facts = told(f"replay {other} --frames {exported}")
+    facts = json_of(f"replay {other} --frames {exported}")
     assert (facts["frames"], facts["quiet_frames"], facts["left_out"]) == (FRAMES - 1, 16, 1)
     assert done(f"reconstruct {exported}").count("\n") == FRAMES - 1 + 2
     raw = done(f"replay {other} --mode raw").splitlines()[3]

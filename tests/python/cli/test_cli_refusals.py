@@ -134,8 +134,8 @@ def with_nan(count: int) -> np.ndarray:
 @pytest.mark.parametrize(
     ("voltage", "text"),
     [
-        (with_nan(150), "too many channels"),
-        (np.full((1, 208), np.inf), "too many channels"),
+        (with_nan(150), "too many rows"),
+        (np.full((1, 208), np.inf), "too many rows"),
         (np.zeros((1, 208)), "all voltages are zero; is the skin driven and connected?"),
     ],
     ids=["nan", "inf", "zero"],
@@ -161,12 +161,12 @@ def test_frames_that_cannot_be_used(voltage, text, engine, tmp_path, changed_fra
     ],
 )
 def test_references_that_cannot_be_used(value, text, refused, changed_frames, tmp_path):
-    quiet = session().quiet_v.copy()
+    untouched = session().untouched_v.copy()
     if value:
-        quiet[7, 20] = value
+        untouched[7, 20] = value
     else:
-        quiet[:] = 0
-    path = changed_frames(first=1, reference_voltage_v=quiet)
+        untouched[:] = 0
+    path = changed_frames(first=1, reference_voltage_v=untouched)
     line = refused(FRAME, f"reconstruct {path} -o {tmp_path / 'out.npz'}")
     assert text in line and line.endswith(f"run  eitskin doctor {path}")
 

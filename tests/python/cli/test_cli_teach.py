@@ -56,18 +56,22 @@ BAD: dict[str, tuple[Callable[[Arrays], Arrays], int, str]] = {
         FRAME,
         "look like cm: multiply place_mm by 10",
     ),
-    "no quiet frames": (lambda a: {"untouched": None}, FRAME, "the untouched frame just before it"),
-    "quiet frames of zeros": (
+    "no untouched frames": (
+        lambda a: {"untouched": None},
+        FRAME,
+        "the untouched frame just before it",
+    ),
+    "untouched frames of zeros": (
         lambda a: {"untouched": 0 * a["untouched"]},
         FRAME,
         "take the frame just before each press",
     ),
-    "quiet frame while pressed": (
+    "untouched frame while pressed": (
         lambda a: {"untouched": np.vstack([a["pressed"][:1], a["untouched"][1:]])},
         FRAME,
         "presses 0 (from 0) hardly differ from their untouched frame",
     ),
-    "quiet frames while pressed": (
+    "untouched frames while pressed": (
         lambda a: {"untouched": a["pressed"]},
         FRAME,
         "no press differs from its untouched frame; take that before the finger is down",

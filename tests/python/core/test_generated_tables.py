@@ -50,7 +50,7 @@ def test_constants_have_one_name_and_a_check_that_exists():
         if words[0] == "ctest":
             assert words[1:4] == ["--preset", "host", "-R"]
             assert any(re.search(words[4], name) for name in tests), words
-        elif words[0] == "eitskin":  # studies/tests/test_constants.py
+        elif words[0] == "eitskin":  # studies/tests/test_commands.py
             assert words[1] in ("study", "bench"), words
         else:
             assert words[0] == "scripts/test", words

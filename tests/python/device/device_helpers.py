@@ -23,7 +23,7 @@ from small_models import prebuilt
 
 _REQUESTS = count(2**31)  # above those of any Device
 Kind = TypeVar("Kind")
-QUIET = 8
+UNTOUCHED = 8
 FRAMES = 10
 
 
@@ -35,7 +35,7 @@ def scene() -> Scene:
         "one",
         touches=(touch,),
         frames=FRAMES,
-        quiet_frames=QUIET,
+        quiet_frames=UNTOUCHED,
         elements=2500,
         effects={"noise": {"snr_db": 60.0}},
     )

@@ -29,11 +29,14 @@ def info(**changes: object) -> BoardInfo:
 
 
 def raw_frames(open_electrode: int | None = None) -> list[RawFrame]:
-    """Sixteen quiet frames, all rows of one electrode missing."""
+    """Sixteen untouched frames, all rows of one electrode missing."""
     rows = prebuilt()[0].protocol.drive_measure
     gone = (rows == -1 if open_electrode is None else rows == open_electrode).any(axis=1)
     quality = np.where(gone, int(Quality.OPEN), 0).astype(np.uint8)
-    volts = [np.where(gone, np.nan, quiet).astype(np.float32) for quiet in session().quiet_v[:16]]
+    volts = [
+        np.where(gone, np.nan, untouched).astype(np.float32)
+        for untouched in session().untouched_v[:16]
+    ]
     return [RawFrame(k, 20_800 * k, 20_780, 0, v, quality) for k, v in enumerate(volts)]
 
 
@@ -82,28 +85,29 @@ def test_only_frames_that_are_whole_become_a_frames_file():
     whole, cut = raw_frames(), raw_frames(open_electrode=5)
     known = KnownModel(*prebuilt())
 
-    def made(quiet: list[RawFrame], frames: list[RawFrame]) -> tuple[int, int]:
+    def made(untouched: list[RawFrame], frames: list[RawFrame]) -> tuple[int, int]:
         protocol = known.model.protocol
-        given = as_frames(quiet, frames, protocol, info(), known, allow_nonfinite=True)
+        given = as_frames(untouched, frames, protocol, info(), known, allow_nonfinite=True)
         kept, left_out = finite_only(given, "x")
         return kept.n_frames, left_out
 
     assert made(whole, [*whole[:3], *cut[:2]]) == (3, 2)
     missing = r"x: no frame has all its rows measured; row \d+ is missing most often"
-    for quiet, frames, said in (
+    for untouched, frames, said in (
         (whole, cut, missing),
-        (cut, whole, "x: no quiet frame has all"),
-        ([], whole, "there is no quiet frame"),
+        (cut, whole, "x: no untouched frame has all"),
+        ([], whole, "there is no untouched frame"),
     ):
         with pytest.raises(FrameError, match=said):
-            made(quiet, frames)
+            made(untouched, frames)
 
 
 def test_of_two_tares_the_last_counts():
     order = [True, True, False, False, True, False]
     marked = (
-        replace(raw, flags=int(quiet)) for raw, quiet in zip(raw_frames(), order, strict=False)
+        replace(raw, flags=int(untouched))
+        for raw, untouched in zip(raw_frames(), order, strict=False)
     )
     run = gather(Frame(raw.frame, 0, 0, raw=raw) for raw in marked)
-    assert [raw.frame for raw in run.quiet] == [4] and [raw.frame for raw in run.frames] == [5]
+    assert [raw.frame for raw in run.untouched] == [4] and [raw.frame for raw in run.frames] == [5]
     assert run.left_out == 4

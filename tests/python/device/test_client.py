@@ -9,7 +9,7 @@ from itertools import count
 import pytest
 from device_helpers import (
     FRAMES,
-    QUIET,
+    UNTOUCHED,
     Damaging,
     board_info,
     dropping,
@@ -37,7 +37,7 @@ from small_models import prebuilt, tiny_blob
 @cache
 def clean_run() -> dict[int, bytes]:
     with sim_device() as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         device.start_scene()
         return {raw.frame: raw.voltage_v.tobytes() for raw in raw_frames(device)}
 
@@ -52,7 +52,7 @@ def test_a_lossy_line_loses_frames_but_nothing_else(seed):
     truth, board = clean_run(), transport.board
     try:
         with Device(lossy) as device:
-            device.tare(QUIET)
+            device.tare(UNTOUCHED)
             device.start_scene()
             items = list(device.stream(Stream.RAW | Stream.TOUCHES))
             counters = device.counters
@@ -123,7 +123,7 @@ def test_a_restart_loses_the_reference_and_says_so():
     board = sim_board()
     said = "restarted and has no reference frame; leave the skin untouched"
     with sim_device(board) as device, pytest.raises(DeviceError, match=said):
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         device.start_scene()
         for item in device.stream(Stream.TOUCHES):
             if isinstance(item, SolvedTouches):

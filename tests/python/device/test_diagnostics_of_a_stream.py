@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from device_helpers import QUIET, Damaging, empty_bank, of, same, scene, sim_device
+from device_helpers import UNTOUCHED, Damaging, empty_bank, of, same, scene, sim_device
 
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS, DIAGNOSTICS
 from eitskin.device.bank import bank_bytes
@@ -56,7 +56,7 @@ def faults(items: Iterable[object]) -> list[tuple[int, bool, int, int]]:
 @pytest.mark.parametrize("every", [1, 4])
 def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_it_is_back(every):
     with sim_device(board()) as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         device.start_scene()
         items = list(device.stream(Stream.TOUCHES, every=every))
         assert device.info().faults == 0
@@ -64,9 +64,9 @@ def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_i
     assert [head.open_electrodes for head in heads(items)] == [
         (OFF,) if FROM_FRAME <= head.frame - first < UNTIL_FRAME else () for head in heads(items)
     ]
-    told = [fault for fault in faults(items) if fault[0] == FaultCode.ELECTRODE_OPEN]
+    reported = [fault for fault in faults(items) if fault[0] == FaultCode.ELECTRODE_OPEN]
     gone = first + UNTIL_FRAME + FAULT_CLEAR_FRAMES - 1
-    assert told == [
+    assert reported == [
         (FaultCode.ELECTRODE_OPEN, True, OFF, first + FROM_FRAME),
         (FaultCode.ELECTRODE_OPEN, False, OFF, gone),
     ]
@@ -80,17 +80,17 @@ def test_an_electrode_that_comes_off_is_named_in_that_very_frame_and_goes_when_i
 
 def test_it_is_told_though_nobody_wants_images():
     with sim_device(board()) as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         device.start_scene()
-        told = faults(device.stream(Stream.RAW))
-    found = [fault[:3] for fault in told]
+        reported = faults(device.stream(Stream.RAW))
+    found = [fault[:3] for fault in reported]
     assert found == [(FaultCode.ELECTRODE_OPEN, True, OFF), (FaultCode.ELECTRODE_OPEN, False, OFF)]
 
 
 def test_what_is_not_looked_for_is_not_found():
     opened = bits("electrode open")
     with sim_device(board()) as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         options = board_options(prebuilt()[0], device.board)
         device.solver(replace(options, diagnostics=ALL_DIAGNOSTICS & ~opened))
         device.start_scene()
@@ -105,7 +105,7 @@ def test_the_check_finds_what_the_board_found(tmp_path):
         options = board_options(prebuilt()[0], device.board)
         device.solver(options)
         with Recorder(path, device, options):
-            take_reference(device, QUIET, streamed=True)
+            take_reference(device, UNTOUCHED, streamed=True)
             device.start_scene()
             live = of(Frame, read_frames(device, ALL))
     assert (OFF,) in {frame.info.open_electrodes for frame in live if frame.info is not None}
@@ -126,7 +126,7 @@ def test_the_check_tells_findings_apart(tmp_path):
     path, hiding = tmp_path / "run.eits", Damaging(SimTransport("hides", board()), same, hide)
     with Device(hiding) as device, Recorder(path, device):
         device.solver(board_options(prebuilt()[0]))
-        take_reference(device, QUIET, streamed=True)
+        take_reference(device, UNTOUCHED, streamed=True)
         device.start_scene()
         list(read_frames(device, ALL))
     check, _ = check_recording(path, None)
@@ -177,7 +177,7 @@ def test_what_fault_and_head_tell_is_said_once():
     rise = Fault(FaultCode.ELECTRODE_OPEN, True, 41, 5, 0)
     over = Fault(FaultCode.ELECTRODE_OPEN, False, 53, 5, 0)
     what_to_do = "it makes no contact; wet or press it, then tare"
-    for told, said in (
+    for reported, said in (
         (rise, [f"electrode 5 open, frame 41: {what_to_do}"]),
         (solved(41, open_electrodes=(5,), **opened), []),
         # the fault of 9 was lost
@@ -186,14 +186,16 @@ def test_what_fault_and_head_tell_is_said_once():
         (over, ["electrode 5 open: over, frame 53"]),
         (over, []),
     ):
-        assert events.lines(told if isinstance(told, Frame) else notice_of(told)) == said
+        assert (
+            events.lines(reported if isinstance(reported, Frame) else notice_of(reported)) == said
+        )
 
 
 def test_a_bridged_pair_is_said_once():
     events, both = Novelty(), (0xC0, 0, 0, 0, 0)
     what_to_do = "water, paste or a wire joins them; dry or part them"
     pair = {"diagnostics": bits("electrodes bridged"), "bridged_electrodes": (6, 7)}
-    for told, said in (
+    for reported, said in (
         (Fault(FaultCode.BRIDGED, True, 3, 6, 7, both),
          [f"electrodes 6 and 7 bridged, frame 3: {what_to_do}"]),
         (Fault(FaultCode.BRIDGED, True, 3, 7, 6, both), []),
@@ -201,11 +203,13 @@ def test_a_bridged_pair_is_said_once():
         (Fault(FaultCode.BRIDGED, False, 11, 6, 0), ["electrode 6 bridged: over, frame 11"]),
         (Fault(FaultCode.BRIDGED, False, 11, 7, 0), ["electrode 7 bridged: over, frame 11"]),
     ):  # fmt: skip
-        assert events.lines(told if isinstance(told, Frame) else notice_of(told)) == said
+        assert (
+            events.lines(reported if isinstance(reported, Frame) else notice_of(reported)) == said
+        )
 
 
 def test_what_a_moving_touch_looks_like_is_said_only_when_it_lasts():
     events, off = Novelty(), {"diagnostics": bits("model mismatch"), "model_mismatch": 0.125}
     frames = ((k, off if k in (2, 3, 7, 8, 9, 10) else {}) for k in range(1, 12))
-    told = [events.lines(solved(frame, **found)) for frame, found in frames]
-    assert told == [[]] * 8 + [["model mismatch 12.5 %, frame 9"], [], []]
+    reported = [events.lines(solved(frame, **found)) for frame, found in frames]
+    assert reported == [[]] * 8 + [["model mismatch 12.5 %, frame 9"], [], []]

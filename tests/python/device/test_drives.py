@@ -1,4 +1,4 @@
-"""Touches after each drive of a simulated board: where and when they are told, what a recording
+"""Touches after each drive of a simulated board: where and when they are reported, what a recording
 gives again to the bit, and what is refused."""
 
 from dataclasses import replace
@@ -66,16 +66,18 @@ def recorded(scene) -> tuple[Path, list[Any]]:
 def test_they_are_told_soon_where_they_are_and_how_fast(recorded):
     reports = [item for item in recorded[1] if isinstance(item, DriveReport)]
     begun = reports[0].time_s - DRIVE_S / 2  # the scene's time 0
-    told = [(one.time_s - begun, one.touches) for one in reports if one.touches]
-    assert reports[0].touches == () and 0 < told[0][0] - CONTACT_S < 6 * DRIVE_S
-    assert {len(touches) for _, touches in told} == {1}
-    assert {touch.id for _, touches in told for touch in touches} == {told[0][1][0].id}
-    x_mm = [-20 + SPEED_MM_PER_S * min(max(s - MOVES_S, 0), 0.1) for s, _ in told]
-    off_mm = [np.hypot(t.x_mm - x, t.y_mm - 10) for x, (_, (t,)) in zip(x_mm, told, strict=True)]
+    reported = [(one.time_s - begun, one.touches) for one in reports if one.touches]
+    assert reports[0].touches == () and 0 < reported[0][0] - CONTACT_S < 6 * DRIVE_S
+    assert {len(touches) for _, touches in reported} == {1}
+    assert {touch.id for _, touches in reported for touch in touches} == {reported[0][1][0].id}
+    x_mm = [-20 + SPEED_MM_PER_S * min(max(s - MOVES_S, 0), 0.1) for s, _ in reported]
+    off_mm = [
+        np.hypot(t.x_mm - x, t.y_mm - 10) for x, (_, (t,)) in zip(x_mm, reported, strict=True)
+    ]
     assert off_mm[0] < 6 and np.median(off_mm) < 2 and max(off_mm) < 8
-    speeds = [t.vx_mm_per_s for s, (t,) in told if MOVES_S + 0.03 < s < STOPS_S]
+    speeds = [t.vx_mm_per_s for s, (t,) in reported if MOVES_S + 0.03 < s < STOPS_S]
     assert np.median(speeds) == pytest.approx(SPEED_MM_PER_S, rel=0.15)
-    assert told[-1][1][0].confirmed and not told[0][1][0].confirmed
+    assert reported[-1][1][0].confirmed and not reported[0][1][0].confirmed
     frames = [item for item in recorded[1] if isinstance(item, Frame)]
     assert not any(frame.diagnostics for frame in frames if frame.touches)  # its lift may name one
     assert any(len(frame.touches) == 1 for frame in frames)

@@ -28,7 +28,7 @@ def frames_of(url: str, mode: Stream, record: Path | None = None, **more: object
         return [item for item in session.messages() if isinstance(item, Frame)]
 
 
-def told(frames: list[Frame]) -> list[str]:
+def reported(frames: list[Frame]) -> list[str]:
     """What is worth a line."""
     return [event.name for frame in frames for event in frame.events if event.is_gesture]
 
@@ -43,7 +43,7 @@ def told(frames: list[Frame]) -> list[str]:
     ],
 )
 def test_a_scene_tells_its_gesture(scene, expected):
-    assert told(frames_of(f"sim:{scene}", Stream.TOUCHES)) == expected
+    assert reported(frames_of(f"sim:{scene}", Stream.TOUCHES)) == expected
 
 
 @pytest.mark.parametrize("side", ["right", "up", "left", "down"])
@@ -51,7 +51,7 @@ def test_a_swipe_says_which_way(side):
     frames = frames_of(f"sim:swipe_{side}", Stream.TOUCHES)
     swipes = [one for frame in frames for one in frame.events if one.kind == EventKind.SWIPE]
     assert [one.side for one in swipes] == [side]
-    assert told(frames) == ["swipe"]
+    assert reported(frames) == ["swipe"]
 
 
 def test_the_boards_events_are_the_hosts_and_a_recording_keeps_them(tmp_path):
@@ -59,7 +59,7 @@ def test_the_boards_events_are_the_hosts_and_a_recording_keeps_them(tmp_path):
     everything = Stream.RAW | Stream.TOUCHES | Stream.EVENTS
     live = frames_of("sim:double_tap", everything, record=path)
     here = frames_of("sim:double_tap", Stream.TOUCHES)
-    assert told(live) == told(here) == ["tap", "double-tap"]
+    assert reported(live) == reported(here) == ["tap", "double-tap"]
     sent = [frame.board_events for frame in live if frame.board_events is not None]
     assert sent == [frame.events for frame in here]
     with Device(FileTransport(path)) as device:
@@ -71,8 +71,8 @@ def test_the_boards_events_are_the_hosts_and_a_recording_keeps_them(tmp_path):
 
 def test_events_alone_can_be_asked_for():
     frames = frames_of("sim:tap", Stream.EVENTS)
-    assert told(frames) == ["tap"]
-    message = next(frame.message() for frame in frames if told([frame]))
+    assert reported(frames) == ["tap"]
+    message = next(frame.message() for frame in frames if reported([frame]))
     assert message["touches"] is None
     event = message["events"][-1]
     assert event["kind"] == "tap" and event["zone"] is None and event["direction_deg"] is None
@@ -83,7 +83,7 @@ def test_zones_are_pressed_by_the_boards_events_too():
     pad = Zone("pad", x_mm=30, y_mm=20, outer_mm=15)
     for mode in (Stream.TOUCHES, Stream.EVENTS):
         frames = frames_of("sim:tap", mode, zones=(pad,))
-        assert sorted(told(frames)) == ["press", "release", "tap"]
+        assert sorted(reported(frames)) == ["press", "release", "tap"]
         names = [one.zone_name for frame in frames for one in frame.events if one.zone]
         assert names == ["pad", "pad"]
 
@@ -95,7 +95,7 @@ def test_options_that_cannot_be_are_refused():
         Gestures(pair_mm=-1)
     with pytest.raises(UsageError, match="at most 64"):
         Gestures([Zone("a", outer_mm=1)] * 65)
-    with pytest.raises(UsageError, match="a, b cannot be"):
+    with pytest.raises(UsageError, match="one of a, b is not valid"):
         Gestures([Zone("a", outer_mm=1), Zone("b", inner_mm=2, outer_mm=1)])
 
 

@@ -64,9 +64,9 @@ def test_whoever_follows_a_board_hears_that_current_flows_on(
         device.settings(Setting.KEEP_DRIVE)
         return device
 
-    for opening, told in ((open_with_files, []), (opened, [KEPT_ON])):
+    for opening, reported in ((open_with_files, []), (opened, [KEPT_ON])):
         said: list[str] = []
         monkeypatch.setattr("eitskin.session.session.open_with_files", opening)
         with Session("sim:two_touch", SessionSettings(frames=1), say=said.append) as session:
             session.start()
-        assert said == told
+        assert said == reported

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from device_helpers import FRAMES, QUIET, Damaging, same, sim_board, sim_device
+from device_helpers import FRAMES, UNTOUCHED, Damaging, same, sim_board, sim_device
 
 from eitskin.device.client import Device
 from eitskin.device.open import open_device
@@ -37,12 +37,12 @@ def record(path: Path, *, tare_first: bool = False) -> tuple[list[object], list[
     packets: list[Packet] = []
     with sim_device() as device:
         if tare_first:
-            device.tare(QUIET)
+            device.tare(UNTOUCHED)
         with Recorder(path, device):
             device.record(packets.append)
             if not tare_first:
                 device.send_command(StreamCommand(Stream.RAW, 0xFFFF), 1.0)
-                device.tare(QUIET)
+                device.tare(UNTOUCHED)
             device.start_scene()
             items = list(device.stream(ALL))
     return items, packets
@@ -96,12 +96,12 @@ def test_kinds_and_every_nth_of_a_recording(tmp_path):
 KILLED = """
 import sys
 sys.path[:0] = {paths!r}
-from device_helpers import QUIET, sim_device
+from device_helpers import UNTOUCHED, sim_device
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.recordings.recording import Recorder
 
 with sim_device() as device:
-    device.tare(QUIET)
+    device.tare(UNTOUCHED)
     with Recorder(sys.argv[1], device):
         for item in device.stream(Stream(7)):  # the scene is not begun: it goes on for ever
             print(type(item).__name__, flush=True)
@@ -123,18 +123,18 @@ def test_a_killed_recorder_loses_at_most_the_last_packet(seed, tmp_path):
         [sys.executable, "-c", script, path], stdout=subprocess.PIPE, text=True
     ) as child:
         assert child.stdout is not None
-        told = [child.stdout.readline().strip() for _ in range(30 + 20 * seed)]
+        reported = [child.stdout.readline().strip() for _ in range(30 + 20 * seed)]
         time.sleep(0.001 * random.Random(seed).random())
         child.kill()
-        told += child.stdout.read().split()
+        reported += child.stdout.read().split()
     assert child.returncode == -signal.SIGKILL
     with open_device(f"file:{path}") as device:
         replayed = list(device.stream(ALL))
         assert device.counters.gaps == device.counters.crc_errors == 0
         assert device.counters.framing_errors <= 1  # the packet that was being written
-    assert [type(item).__name__ for item in replayed][: len(told)] == told
+    assert [type(item).__name__ for item in replayed][: len(reported)] == reported
     with sim_device() as device:  # the same run again, live
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         live = islice(device.stream(ALL), len(replayed))
         assert [contents(item) for item in replayed] == [contents(item) for item in live]
 
@@ -187,12 +187,12 @@ def test_gaps_of_the_live_run_are_in_the_recording(tmp_path):
         assert (device.counters.missing, device.counters.gaps) == (3, 1)
 
 
-def test_frames_of_a_recording_without_a_quiet_frame(tmp_path):
+def test_frames_of_a_recording_without_an_untouched_frame(tmp_path):
     with sim_device() as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         with Recorder(tmp_path / "unquiet.eits", device):
             list(device.stream(Stream.RAW, frames=2))
-    with pytest.raises(FrameError, match="no quiet frame"):
+    with pytest.raises(FrameError, match="no untouched frame"):
         frames_of(tmp_path / "unquiet.eits")
 
 

@@ -91,11 +91,11 @@ def test_a_slow_reader_loses_the_oldest_whole_frames_and_knows_how_many(wire):
         counters = device.counters
         stream.close()
     assert stats.frames_scanned > 200
-    told = sum(event.missing for event in of(LinkEvent, items) if event.kind == "dropped")
+    reported = sum(event.missing for event in of(LinkEvent, items) if event.kind == "dropped")
     frames = [item.frame for item in of(RawFrame, items)]
     assert frames == sorted(set(frames))
-    assert told >= 50
-    assert frames[-1] - frames[0] + 1 - len(frames) == told  # exactly those that are missing
+    assert reported >= 50
+    assert frames[-1] - frames[0] + 1 - len(frames) == reported  # exactly those that are missing
     # the port itself never waited
     assert counters.gaps == counters.crc_errors == counters.framing_errors == 0
 

@@ -7,7 +7,7 @@ from itertools import zip_longest
 
 import numpy as np
 import pytest
-from device_helpers import FRAMES, QUIET, frames, of, raw_frames, sim_board, sim_device
+from device_helpers import FRAMES, UNTOUCHED, frames, of, raw_frames, sim_board, sim_device
 
 from eitskin.device.known_model import board_options
 from eitskin.device.wire import link_table as cmd
@@ -25,15 +25,15 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit():
     model, blob = prebuilt()
     with sim_device() as device:
         device.send_command(cmd.StreamCommand(Stream.RAW), 1.0)
-        device.tare(QUIET)
-        quiet = [device.next_item(0.0) for _ in range(QUIET)]
+        device.tare(UNTOUCHED)
+        untouched = [device.next_item(0.0) for _ in range(UNTOUCHED)]
         device.start_scene()
         board, items = device.board, list(device.stream(ALL))
     raws, images, touches = (of(kind, items) for kind in (RawFrame, SolvedImage, SolvedTouches))
     assert len(raws) == len(images) == len(touches) == FRAMES
     assert [type(item) for item in items[:3]] == [RawFrame, SolvedImage, SolvedTouches]
     skin = Reconstructor(model, blob=blob, options=board_options(model, board))
-    skin.tare(np.array([raw.voltage_v for raw in quiet]))
+    skin.tare(np.array([raw.voltage_v for raw in untouched]))
     for raw, image, found in zip(raws, images, touches, strict=True):
         result = skin.reconstruct(raw.voltage_v)
         assert image.image.tobytes() == result.image.astype(np.float32).tobytes()
@@ -47,16 +47,16 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit():
 
 def test_frames_are_the_scenes_but_for_a_converter_of_16_bits():
     with sim_device() as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         device.start_scene()
         raws = raw_frames(device)
         step_v = 1e-9 * device.info().volts_per_code_nv
     true = frames().voltage_v(prebuilt()[0].protocol)
     assert 2.0 < 65536 * step_v / np.abs(true).max() < 2.2
     measured = np.array([raw.voltage_v for raw in raws])
-    gain = np.sum(measured * true[QUIET:]) / np.sum(true[QUIET:] ** 2)
+    gain = np.sum(measured * true[UNTOUCHED:]) / np.sum(true[UNTOUCHED:] ** 2)
     assert gain == pytest.approx(1, abs=1e-4)
-    error = measured / gain - true[QUIET:]
+    error = measured / gain - true[UNTOUCHED:]
     assert np.abs(error).max() < step_v
     assert np.sqrt(np.mean(error**2)) < 0.2 * step_v < 2e-5 * np.sqrt(np.mean(true**2))
 
@@ -79,13 +79,17 @@ def test_boards_in_one_process_do_not_meet():
 
 def test_the_skin_is_untouched_until_the_scene_begins():
     with sim_device() as device:
-        quiet = np.array([raw.voltage_v for raw in raw_frames(device, 2 * QUIET)])
-        assert np.abs(quiet[QUIET:] - quiet[:QUIET]).max() < 3e-5
-        device.tare(QUIET)
+        untouched = np.array([raw.voltage_v for raw in raw_frames(device, 2 * UNTOUCHED)])
+        assert np.abs(untouched[UNTOUCHED:] - untouched[:UNTOUCHED]).max() < 3e-5
+        device.tare(UNTOUCHED)
         device.start_scene()
         touched = raw_frames(device)[0].voltage_v
-    rms = float(np.sqrt(np.mean(quiet[0] ** 2)))
-    assert np.abs(touched - quiet[0]).max() > 0.02 * rms > np.abs(quiet[1] - quiet[0]).max()
+    rms = float(np.sqrt(np.mean(untouched[0] ** 2)))
+    assert (
+        np.abs(touched - untouched[0]).max()
+        > 0.02 * rms
+        > np.abs(untouched[1] - untouched[0]).max()
+    )
 
 
 def test_board_time_is_the_scenes_and_the_scene_ends():
@@ -107,7 +111,7 @@ def test_a_faster_scan_sees_scene_frames_more_than_once():
         device.start_scene()
         raws = raw_frames(device)
     assert [raw.time_us for raw in raws] == [20 + 20_800 * k for k in range(len(raws))]
-    true = frames().voltage_v(prebuilt()[0].protocol)[QUIET:]
+    true = frames().voltage_v(prebuilt()[0].protocol)[UNTOUCHED:]
     shown = [int(np.abs(true - raw.voltage_v).max(axis=1).argmin()) for raw in raws]
     assert shown == [int(k * 20_800 / 50_000 + 0.5) for k in range(len(raws))]
     assert len(raws) == 23  # until 20.8 ms k is nearer to frame 10 than to 9
@@ -117,7 +121,7 @@ def test_a_faster_scan_sees_scene_frames_more_than_once():
 def test_masked_rows_are_left_out():
     with sim_device() as device:
         device.mask_row(5)
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         device.start_scene()
         items = list(device.stream(ALL, frames=2))
         raw, image = of(RawFrame, items)[0], of(SolvedImage, items)[0]
@@ -164,7 +168,7 @@ def test_commands_out_of_range_are_refused_and_change_nothing(command, status, d
 
 def test_a_reset_begins_anew():
     with sim_device() as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         assert device.info().tared == 1
         info = device.reset()
         assert (info.tared, info.streaming) == (0, 0)
@@ -176,7 +180,7 @@ def test_a_reset_begins_anew():
 def test_options_of_the_solver_are_taken():
     options = default_options(prebuilt()[0])
     with sim_device() as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         device.start_scene()
         device.solver(replace(options, iterations=7, warm_start=True))
         image = of(SolvedImage, device.stream(Stream.IMAGE, frames=1))[0]
@@ -191,7 +195,7 @@ def test_options_of_the_solver_are_taken():
 
 def test_a_scan_forgets_the_reference():
     with sim_device() as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         assert device.scan(samples=100).tared == 0
         assert device.board.samples == 100
         with pytest.raises(
@@ -219,7 +223,7 @@ def test_bad_numbers_are_refused_before_they_are_sent():
 
 def test_the_self_test_runs_the_golden_frame():
     with sim_device() as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         device.self_test()
         device.clear_faults()
         assert device.info().tared == 1

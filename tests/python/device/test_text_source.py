@@ -88,7 +88,7 @@ def piped(folder: Path, data: bytes) -> Path:
 
 
 def streamed(url: str, *, tare: int = 8) -> tuple[list[object], LinkCounters]:
-    """The raw frames after a tare and what else was told; what was counted."""
+    """The raw frames after a tare and what else was reported; what was counted."""
     with open_device(url) as device:
         device.tare(tare)
         return list(device.stream(Stream.RAW)), device.counters
@@ -338,8 +338,8 @@ def test_the_example_of_a_source_is_one(monkeypatch):
         assert (device.board.board, device.board.frame_period_us) == ("breathing", 2000)
         device.tare(8)
         raw = list(device.stream(Stream.RAW, frames=3))
-    quiet = prebuilt()[0].golden.reference_v
-    assert np.allclose(np.abs(raw[0].voltage_v), np.abs(quiet), rtol=2e-3)
+    untouched = prebuilt()[0].golden.reference_v
+    assert np.allclose(np.abs(raw[0].voltage_v), np.abs(untouched), rtol=2e-3)
     for url, said in (
         ("breathing:fast", "write frames a second"),
         ("broken:1", "own_source:absent failed"),

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from itertools import pairwise
 
 import pytest
-from device_helpers import QUIET, of, scene, sim_board
+from device_helpers import UNTOUCHED, of, scene, sim_board
 
 from eitskin.device.client import Device
 from eitskin.device.link import Reconnect, ThreadedLink
@@ -104,7 +104,7 @@ def plugged() -> Iterator[tuple[Device, Port]]:
         device.link._stopping = Clock(port)
         next_item = device.next_item
         device.next_item = lambda timeout_s: next_item(min(timeout_s, 0.001))
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         yield device, port
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 from device_helpers import (
-    QUIET,
+    UNTOUCHED,
     Damaging,
     dropping,
     frames,
@@ -45,7 +45,7 @@ def test_a_model_is_taken_up():
     seen: list[tuple[int, int]] = []
     board = sim_board()
     with sim_device(board) as device:
-        device.tare(QUIET)
+        device.tare(UNTOUCHED)
         info = device.upload_model(tiny, lambda done, total: seen.append((done, total)))
         found = info.model_crc, info.model_bytes, info.bank, info.tared
         assert found == (zlib.crc32(tiny), len(tiny), 1, 0)

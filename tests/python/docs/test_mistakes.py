@@ -1,6 +1,6 @@
 """mistakes.md: every mistake in it is made, and gets the answer that stands there.
 
-``PYTHONPATH=tests/python python tests/python/docs/test_mistakes.py`` writes the answers anew.
+``PYTHONPATH=tests/python python tests/python/docs/test_mistakes.py`` writes the answers again.
 """
 
 import contextlib

@@ -62,25 +62,25 @@ def test_a_drive_has_the_hosts_bits_and_a_bounded_cost(cortex_m7, tmp_path, name
     rng = np.random.default_rng(9)
     v0 = model.golden.reference_v.astype(np.float64)
     sigma = 1e-3 * float(np.sqrt(np.mean(v0**2)))
-    quiet = (v0 + sigma * rng.standard_normal((16, len(v0)))).astype(np.float32)
+    untouched = (v0 + sigma * rng.standard_normal((16, len(v0)))).astype(np.float32)
     scans = scans_of(name, v0, rng).astype(np.float32)
     board: EmulatedRun = run_steps(
         cortex_m7 / PROGRAM,
         tmp_path,
-        (Load(blob), Choose(default_options(model)), TareStep(quiet), Drives(scans, STEP)),
+        (Load(blob), Choose(default_options(model)), TareStep(untouched), Drives(scans, STEP)),
     )
     engine = CoreEngine(blob)
     engine.set_options(default_options(model))
-    engine.set_reference(quiet.astype(np.float64))
+    engine.set_reference(untouched.astype(np.float64))
     fast = FastCore(engine)
     fast.begin()
     assert fast.bytes >= board.fast_bytes > 16_000  # pointers are smaller there
-    told = iter(board.drives)
+    reported = iter(board.drives)
     drive_s = ROW_S * len(v0) / len(fast.rows)
     for k, (scan, seen) in enumerate(zip(scans, board.scans, strict=True)):
         for n, number in enumerate(order(fast)):
             here = fast.drive(number, scan[fast.rows[number]], (k * len(fast.rows) + n) * drive_s)
-            there = next(told)
+            there = next(reported)
             assert (there.drive, there.status) == (number, 0)
             assert there.touches == printed(here)
         aligned = fast.aligned(scan)
@@ -93,5 +93,5 @@ def test_a_drive_has_the_hosts_bits_and_a_bounded_cost(cortex_m7, tmp_path, name
     assert max(drive.stack_bytes for drive in board.drives) < 5000
     followed = [one.instructions for one in board.drives if one.touches.startswith("1 ")]
     assert name != "one" or np.median(followed) < ONE_TOUCH
-    told_of = any(drive.touches[0] != "0" for drive in board.drives)
-    assert name == "light" or told_of == (name != "quiet")
+    reported_of = any(drive.touches[0] != "0" for drive in board.drives)
+    assert name == "light" or reported_of == (name != "quiet")

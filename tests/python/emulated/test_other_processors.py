@@ -47,7 +47,7 @@ def test_the_same_bits_as_the_host(processor, tmp_path):
     random = session()
     frames = np.concatenate([random.frames_v[:8], random.frames_v[:2]])
     frames[2, (model.protocol.drive_measure == 6).any(axis=1)] = np.nan
-    frames[3] = random.quiet_v.mean(axis=0)
+    frames[3] = random.untouched_v.mean(axis=0)
     usual = default_options(model)
     ways = [
         usual,
@@ -57,10 +57,10 @@ def test_the_same_bits_as_the_host(processor, tmp_path):
     steps: list[Step] = []
     expected = []
     for options in ways:
-        steps += [Load(blob), Choose(options), TareStep(random.quiet_v[:16]), Play(frames)]
+        steps += [Load(blob), Choose(options), TareStep(random.untouched_v[:16]), Play(frames)]
         host = CoreEngine(blob)
         host.set_options(options)
-        host.set_reference(random.quiet_v[:16].astype(np.float32).astype(np.float64))
+        host.set_reference(random.untouched_v[:16].astype(np.float32).astype(np.float64))
         results = [host.reconstruct(frame.astype(np.float32)) for frame in frames]
         expected += [(zlib.crc32(r.image.tobytes()), printed_touches(r.touches)) for r in results]
     program = built(processor, tmp_path / "build")

@@ -15,7 +15,7 @@ import pytest
 from eitskin.core.options_table import ALL_TOUCH_FIT, SOLVERS
 from eitskin.core.results import Options
 from eitskin.model.eitm import encode_model
-from eitskin.model.force_law import LoadLaw
+from eitskin.model.force_law import ForceLaw
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
@@ -43,12 +43,12 @@ def run(
     program: Path,
     folder: Path,
     blob: bytes,
-    quiet: np.ndarray,
+    untouched: np.ndarray,
     frames: np.ndarray,
     options: Options,
 ) -> tuple[EmulatedFrame, ...]:
     """The results of the processor's own kernels."""
-    done = run_frames(program, folder, blob, quiet, frames, options)
+    done = run_frames(program, folder, blob, untouched, frames, options)
     assert done.kernels == "cortex-m7"
     return done.frames
 
@@ -56,15 +56,15 @@ def run(
 def session(
     model: Model, seed: int, count: int, noise: float = 1e-3
 ) -> tuple[np.ndarray, np.ndarray]:
-    """16 quiet frames and ``count`` frames of one to three touches by the model's own linear
+    """16 untouched frames and ``count`` frames of one to three touches by the model's own linear
     answer, with noise at 60 dB."""
     rng = np.random.default_rng(seed)
     reference = model.golden.reference_v.astype(np.float64)
     noise *= np.sqrt(np.mean(reference**2))
     change = model.golden.frame_v.astype(np.float64) - reference
-    quiet = reference + noise * rng.standard_normal((16, len(reference)))
+    untouched = reference + noise * rng.standard_normal((16, len(reference)))
     strength = rng.uniform(0.3, 1.5, (count, 1))
-    return quiet, reference + strength * change + noise * rng.standard_normal(
+    return untouched, reference + strength * change + noise * rng.standard_normal(
         (count, len(reference))
     )
 
@@ -76,12 +76,17 @@ def test_the_same_bits_as_the_host(same_everywhere, solver):
     cases = [(storage, warm) for storage in STORAGES for warm in (False, True)]
     steps = []
     for storage, warm in cases:
-        quiet, frames = session(model, 5, 4, noise=1e-2 if warm else 1e-3)
+        untouched, frames = session(model, 5, 4, noise=1e-2 if warm else 1e-3)
         # an electrode lost for one frame; no touch
         frames[2, (model.protocol.drive_measure == 6).any(axis=1)] = np.nan
-        frames[3] = quiet.mean(axis=0)
+        frames[3] = untouched.mean(axis=0)
         options = replace(default_options(model), warm_start=warm, solver=solver)
-        steps += [Load(in_storage(model, storage)), Choose(options), TareStep(quiet), Play(frames)]
+        steps += [
+            Load(in_storage(model, storage)),
+            Choose(options),
+            TareStep(untouched),
+            Play(frames),
+        ]
     _, outcomes = same_everywhere.steps(steps)
     for k, (_, warm) in enumerate(cases):
         first, second, lost, none = found = outcomes[4 * k : 4 * k + 4]
@@ -115,20 +120,20 @@ def test_loads_have_the_hosts_bits(same_everywhere):
     table = np.linspace(0, 6, 9, dtype=np.float32)
     gain = np.array([1.0, 0.07, -0.11, 0.23, 0.05, 0.19, -0.3, 0.2, 0.11, 0.4], dtype=np.float32)
     blob = encode_model(
-        replace(model, load=LoadLaw(table, 0.3 * table**1.3, gain, 3, 97.0, 0.8, 0.02))
+        replace(model, force_law=ForceLaw(table, 0.3 * table**1.3, gain, 3, 97.0, 0.8, 0.02))
     )
     random = simulated_session()
-    found = same_everywhere(blob, random.quiet_v, random.frames_v[:6])
+    found = same_everywhere(blob, random.untouched_v, random.frames_v[:6])
     assert sum(touch.force_n > 0 for one in found for touch in one.touches) >= len(found)
 
 
 def test_instructions_are_counted_exactly(program, tmp_path):
     model, blob = load_prebuilt()
-    quiet, frames = session(model, 6, 2)
+    untouched, frames = session(model, 6, 2)
     for solver in SOLVERS:
         options = replace(default_options(model), solver=solver)
-        first = run(program, tmp_path, blob, quiet, frames, options)
-        assert first == run(program, tmp_path, blob, quiet, frames, options)
+        first = run(program, tmp_path, blob, untouched, frames, options)
+        assert first == run(program, tmp_path, blob, untouched, frames, options)
         for result in first:
             per_mac = (result.solve_instructions + result.touch_instructions) / result.macs
             print(
@@ -139,7 +144,7 @@ def test_instructions_are_counted_exactly(program, tmp_path):
 
 
 def moving_touches() -> tuple[np.ndarray, np.ndarray]:
-    """Quiet frames and 12 frames of two fingers, simulated nonlinearly, that come down at once,
+    """Untouched frames and 12 frames of two fingers, simulated nonlinearly, that come down at once,
     move by 2 mm a frame (100 mm/s at 48 frames a second) and are joined by a third at frame 6."""
     fingers = [(-50.0, 20.0, 9.0, 6.0), (30.0, -35.0, 11.0, 8.0), (45.0, 45.0, 8.0, 4.0)]
     scenes = tuple(
@@ -150,7 +155,7 @@ def moving_touches() -> tuple[np.ndarray, np.ndarray]:
         for k in range(12)
     )
     simulated = simulate(paper_skin(), adjacent(16), TouchSet("moving", 1, scenes))
-    return simulated.quiet_v, simulated.frames_v
+    return simulated.untouched_v, simulated.frames_v
 
 
 # with the search, two near touches are tried as one long one: up to 6.5 million
@@ -165,11 +170,11 @@ def test_what_a_frame_costs_at_most(program, tmp_path, warm, touch_fit):
     other without any rest."""
     model, blob = load_prebuilt()
     random = simulated_session()
-    for quiet, frames in (moving_touches(), (random.quiet_v, random.frames_v)):
+    for untouched, frames in (moving_touches(), (random.untouched_v, random.frames_v)):
         options = replace(
             default_options(model), warm_start=warm, touch_fit=touch_fit, touch_test=touch_fit != 0
         )
-        board = run(program, tmp_path, blob, quiet, frames, options)
+        board = run(program, tmp_path, blob, untouched, frames, options)
         costs = [result.solve_instructions + result.touch_instructions for result in board]
         print(
             f"{'warm' if warm else 'cold'}: mean {np.mean(costs):.0f}, most {max(costs)}"
@@ -197,7 +202,7 @@ def test_every_storage_costs_little_more_than_f32(program, tmp_path):
             program,
             tmp_path,
             in_storage(model, storage),
-            random.quiet_v,
+            random.untouched_v,
             random.frames_v,
             default_options(model),
         )
@@ -216,10 +221,10 @@ def test_every_storage_costs_little_more_than_f32(program, tmp_path):
 )
 def test_plain_c_gives_the_same_for_more_instructions(program, tmp_path, storage):
     model, _ = load_prebuilt()
-    quiet, frames = session(model, 8, 1)
+    untouched, frames = session(model, 8, 1)
     blob, options = in_storage(model, storage), default_options(model)
-    own = run_frames(program, tmp_path, blob, quiet, frames, options)
-    plain = run_frames(program, tmp_path, blob, quiet, frames, options, portable=True)
+    own = run_frames(program, tmp_path, blob, untouched, frames, options)
+    plain = run_frames(program, tmp_path, blob, untouched, frames, options, portable=True)
     assert (own.kernels, plain.kernels) == ("cortex-m7", "portable")
     assert own.workspace_bytes == plain.workspace_bytes
     for one, other in zip(own.frames, plain.frames, strict=True):
@@ -231,7 +236,7 @@ def test_plain_c_gives_the_same_for_more_instructions(program, tmp_path, storage
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_ranks_that_no_block_fits(same_everywhere, solver):
     """Rows and columns that the blocks of the processor's own products leave over."""
-    quiet, given, steps = small().quiet(31, 8), small().frames(30, 3), []
+    untouched, given, steps = small().untouched(31, 8), small().frames(30, 3), []
     given[1, 17:25] = np.nan
     given[2, (small().protocol.drive_measure == 2).any(axis=1)] = np.nan
     for storage, rank in product(STORAGES, (5, 16, 37, 48)):
@@ -239,5 +244,5 @@ def test_ranks_that_no_block_fits(same_everywhere, solver):
             default_options(small_model(storage, rank=rank)), solver=solver, warm_start=True
         )
         blob = small_blob(storage, rank=rank)
-        steps += [Load(blob), Choose(options), TareStep(quiet), Play(given)]
+        steps += [Load(blob), Choose(options), TareStep(untouched), Play(given)]
     assert all(one.status == 0 and one.image.any() for one in same_everywhere.steps(steps)[1])

@@ -77,7 +77,7 @@ def raw_frames(device: Device, count: int) -> list[RawFrame]:
 
 
 def twin_check(
-    device: Device, blob: bytes, frames: int, quiet: int = 4
+    device: Device, blob: bytes, frames: int, untouched: int = 4
 ) -> tuple[HostCheck, list[Frame], list[Reconstruction | None]]:
     """Tare with raw frames, begin the scene, stream everything, and hold it against the host's core
     and its results."""
@@ -85,7 +85,7 @@ def twin_check(
 
     taken: list[Any] = []
     device.send_command(commands.StreamCommand(int(Stream.RAW)), 1.0)
-    device.tare(quiet)
+    device.tare(untouched)
     device.send_command(commands.StreamCommand(0), 1.0)
     while (item := device.next_item(0.05)) is not None:
         taken.append(item)
@@ -93,7 +93,7 @@ def twin_check(
     model = decode_model(blob, "the model")
     twin = HostTwin(KnownModel(model, blob), board_options(model, device.board))
     for item in taken:
-        if isinstance(item, RawFrame) and item.quiet:
+        if isinstance(item, RawFrame) and item.untouched:
             twin.take(Frame(item.frame, 0, item.time_us, raw=item))
     seen, results = [], []
     for item in assembled(device.stream(EVERYTHING, frames=frames), EVERYTHING):

@@ -132,9 +132,9 @@ def test_rows_their_reciprocals_and_turned_pairs():
 
 def test_frames_are_chosen_when_a_scan_begins():
     protocol = adjacent(16)
-    quiet = np.arange(3)[:, None] * 1.0 + np.zeros((3, protocol.n_rows))
+    untouched = np.arange(3)[:, None] * 1.0 + np.zeros((3, protocol.n_rows))
     frames = 100 + np.arange(5)[:, None] + np.zeros((5, protocol.n_rows))
-    skin = AnalogSkin(protocol, quiet, frames, 10.0)
+    skin = AnalogSkin(protocol, untouched, frames, 10.0)
     rows = [tuple(int(k) for k in row) for row in protocol.drive_measure]
 
     def scan(begin: float, end: float) -> set[float]:

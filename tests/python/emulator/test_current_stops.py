@@ -124,7 +124,7 @@ def test_a_current_that_is_not_the_source_s(device, fails):
         assert tripped.current_ua_rms == pytest.approx(2 * 353.6, rel=0.02)
     assert device.send_command(STREAM, 1.0).status == ReplyStatus.TRIPPED
     device.clear_faults()
-    assert device.send_command(STREAM, 1.0).ok  # as the user wishes; it will trip again
+    assert device.send_command(STREAM, 1.0).ok  # as the user asks; it will trip again
     clean(board)
 
 

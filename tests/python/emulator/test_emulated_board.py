@@ -22,13 +22,13 @@ from emulated import EVERYTHING, board_of, clean, connect, power_up, raw_frames,
 
 
 @pytest.fixture(scope="module")
-def quiet(image) -> Device:
+def untouched(image) -> Device:
     """A board before an untouched skin without noise."""
     return connect(power_up(image, noisy=False))
 
 
-def test_the_board_says_what_it_is(quiet):
-    info, (model, blob) = quiet.board, load_prebuilt()
+def test_the_board_says_what_it_is(untouched):
+    info, (model, blob) = untouched.board, load_prebuilt()
     assert (info.board, info.f_cpu_hz, info.electrodes) == ("nucleo_f767zi", 216_000_000, 16)
     assert (info.model_bytes, info.model_crc, info.bank) == (len(blob), zlib.crc32(blob), 0)
     assert info.protocol_hash == model.protocol.hash
@@ -37,25 +37,25 @@ def test_the_board_says_what_it_is(quiet):
     assert bytes.fromhex(info.serial.strip("\0")) != b""
 
 
-def test_the_generator_runs_at_50_khz(quiet):
-    generator = board_of(quiet).generator
+def test_the_generator_runs_at_50_khz(untouched):
+    generator = board_of(untouched).generator
     assert generator.words[0] == 0x2100  # in reset, until a host asks
-    raw_frames(quiet, 1)
+    raw_frames(untouched, 1)
     assert generator.mclk_hz == 8_000_000
     assert abs(generator.frequency_hz - 50_000) < 0.02
     start = [0x2100, 0x4000 | 0x199A, 0x4000 | 0x66, 0xC000, 0x2000]
     assert generator.words[-5:] == start
-    assert abs(quiet.board.excitation_millihz / 1000 - generator.frequency_hz) < 0.001
+    assert abs(untouched.board.excitation_millihz / 1000 - generator.frequency_hz) < 0.001
 
 
 def test_the_image_passes_every_check(image):
     """Of those that notice a mutant in test_mutations.py."""
     session = run_session(image)
-    assert {check.__name__: told for check in CHECKS if (told := check(session))} == {}
+    assert {check.__name__: reported for check in CHECKS if (reported := check(session))} == {}
 
 
 def amplitude_errors_lsb(device: Device) -> np.ndarray:
-    exact = board_of(device).skin.quiet_v[0]
+    exact = board_of(device).skin.untouched_v[0]
     frames = raw_frames(device, 2)
     assert all(frame.quality.max() & ~Quality.RECIPROCITY == 0 for frame in frames)
     return np.concatenate([frame.voltage_v - exact for frame in frames]) / STEP_V
@@ -77,14 +77,14 @@ def test_the_same_session_gives_the_same_bytes(image):
 def test_touches_and_images_are_the_host_s_to_the_bit(image):
     board = power_up(image)
     device = connect(board)
-    check, seen, host = twin_check(device, load_prebuilt()[1], 6, quiet=16)
+    check, seen, host = twin_check(device, load_prebuilt()[1], 6, untouched=16)
     assert (check.same, check.different, check.inconclusive, check.alone) == (6, [], 0, 0)
     assert check.images == check.touches == 6
     for frame, result in zip(seen, host, strict=True):
         assert frame.info is not None
         assert result is not None
-        told = frame.info.macs, frame.info.iterations
-        assert told == (result.info.macs, result.info.iterations)
+        reported = frame.info.macs, frame.info.iterations
+        assert reported == (result.info.macs, result.info.iterations)
     truth = np.array([[-40.0, 10.0], [30.0, -25.0]])
     for frame in seen[2:]:
         assert frame.touches is not None
@@ -137,9 +137,9 @@ def test_frame_rates(image, check_every, rows):
     stages = device.stats().stages
     own_us = {name: stages[name].last_us for name in ("solve", "touches", "demodulate", "send")}
     bound = "the solve" if frame_us > 1.02 * scan_us else "the scan"
-    told = ", ".join(f"{name} {us / 1000:.2f} ms" for name, us in own_us.items())
+    reported = ", ".join(f"{name} {us / 1000:.2f} ms" for name, us in own_us.items())
     rate = f"scan {scan_us / 1000:.2f} ms, frame {frame_us / 1000:.2f} ms ({1e6 / frame_us:.1f} Hz)"
-    print(f"{rows} rows: {rate}; {told}: {bound} bounds it")
+    print(f"{rows} rows: {rate}; {reported}: {bound} bounds it")
     assert abs(scan_us - rows * device.board.slot_us) <= 2 * device.board.slot_us
     # they overlap: it is not their sum
     assert scan_us - 1 <= frame_us <= max(scan_us, sum(own_us.values())) * 1.1
@@ -153,7 +153,7 @@ def test_another_frequency(image):
     assert board.generator.frequency_hz == 0
     frame = raw_frames(device, 1)[0]
     assert abs(board.generator.frequency_hz - 25_000) < 0.02
-    assert np.abs(frame.voltage_v - board.skin.quiet_v[0]).max() < 0.5 * STEP_V
+    assert np.abs(frame.voltage_v - board.skin.untouched_v[0]).max() < 0.5 * STEP_V
     with pytest.raises(DeviceError):
         device.scan(excitation_hz=33_333)
     assert abs(board.generator.frequency_hz - 25_000) < 0.02

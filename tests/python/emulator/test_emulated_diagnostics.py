@@ -46,8 +46,8 @@ def test_an_electrode_that_comes_off_in_mid_stream(image):
     model, blob = load_prebuilt()
     wobble = {"detached": {"electrodes": [5], "from_s": 0.01, "until_s": 0.07}}
     device = device_before(image, skin_of(scene(wobble), model.protocol))
-    told: list[Fault] = []
-    device.record(lambda packet: told.extend(_faults(packet)))
+    reported: list[Fault] = []
+    device.record(lambda packet: reported.extend(_faults(packet)))
     check, seen, _ = twin_check(device, blob, 20)
     # The line drops packets, and touches after a gap are not compared. A few microseconds in the
     # main loop decide which frames lose one: 10 or 11 of 20 are complete.
@@ -60,7 +60,7 @@ def test_an_electrode_that_comes_off_in_mid_stream(image):
     named = [f.number for f in seen if f.info is not None and f.info.open_electrodes == (5,)]
     assert named[0] <= whole[0]
     assert set(whole) <= set(named)
-    mine = [fault for fault in told if fault.code == FaultCode.ELECTRODE_OPEN]
+    mine = [fault for fault in reported if fault.code == FaultCode.ELECTRODE_OPEN]
     assert [(fault.raised, fault.index, fault.frame) for fault in mine] == [
         (True, 5, named[0]), (False, 5, named[-1] + FAULT_CLEAR_FRAMES),
     ]  # fmt: skip

@@ -1,5 +1,5 @@
-"""Touches after each drive on the emulated board: told while whole frames are solved, at the frame
-rate, and the bits of this host."""
+"""Touches after each drive on the emulated board: reported while whole frames are solved, at the
+frame rate, and the bits of this host."""
 
 import numpy as np
 
@@ -37,15 +37,15 @@ def test_drives_do_not_wait_for_frames(tmp_path):
         stats = session.device.stats()
         interrupts = session.device.transport.board.record.interrupts
     frames = [item for item in items if isinstance(item, Frame)]
-    told = [item for item in items if isinstance(item, DriveReport) and item.touches]
+    reported = [item for item in items if isinstance(item, DriveReport) and item.touches]
     solved = [frame.info for frame in frames if frame.info is not None]
-    # solves take several drives' time; drives are told within their own
+    # solves take several drives' time; drives are reported within their own
     assert max(one.solve_us + one.touch_us for one in solved) > 3 * DRIVE_US
-    ages_us = [one.packet.head.age_us for one in told]
-    assert np.quantile(ages_us, 0.8) < DRIVE_US and len(told) > 16 * (FRAMES - 4)
+    ages_us = [one.packet.head.age_us for one in reported]
+    assert np.quantile(ages_us, 0.8) < DRIVE_US and len(reported) > 16 * (FRAMES - 4)
     # the frame rate holds: no scan waited, no row was late
     assert {int(us) for us in np.diff([frame.board_us for frame in frames])} == {SCAN_US}
-    assert {int(us) for us in np.diff([one.board_us for one in told])} == {DRIVE_US}
+    assert {int(us) for us in np.diff([one.board_us for one in reported])} == {DRIVE_US}
     assert (stats.slots_repeated, stats.packets_dropped) == (0, 0)
     assert interrupts[PENDSV] >= 16 * FRAMES
     assert stats.stack_used < 0.75 * stats.stack_bytes

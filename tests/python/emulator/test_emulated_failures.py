@@ -17,11 +17,11 @@ LOAD_NOWHERE = bytes.fromhex("4ff0c0400068fee7")  # mov.w r0, #0x60000000; ldr r
 
 def faults_of(device: Device) -> list[Fault]:
     """What the board reports its own accord now."""
-    told = []
+    reported = []
     while (item := device.next_item(0.1)) is not None:
         if isinstance(item, Fault):
-            told.append(item)
-    return told
+            reported.append(item)
+    return reported
 
 
 def test_a_program_that_crashes_opens_the_multiplexers_and_says_where(image):
@@ -41,9 +41,9 @@ def test_a_program_that_crashes_opens_the_multiplexers_and_says_where(image):
     board.reset = noted
     board.run_until(board.clock.now + TICKS_PER_S, lambda: len(board.record.resets) > 1)
     assert board.record.resets == ["power", "software"] and at_reset == [(None,) * 4]
-    told = [fault for fault in faults_of(device) if fault.code == FaultCode.CRASH]
-    assert told
-    pc, _, cfsr, _, address = told[0].words
+    reported = [fault for fault in faults_of(device) if fault.code == FaultCode.CRASH]
+    assert reported
+    pc, _, cfsr, _, address = reported[0].words
     assert pc == RAM + len(board.memories.ram) - 64 + 4
     assert address == 0x60000000
     assert cfsr & (1 << 15 | 1 << 7)
@@ -57,9 +57,9 @@ def test_the_stack_is_guarded(image):
     board.run_until(board.clock.now + 1000 * TICKS_PER_US, lambda: board._asleep)
     hang(board, bytes.fromhex("4ff000500160fee7"))  # mov.w r0, #0x20000000; str r1, [r0]; b .
     board.run_until(board.clock.now + TICKS_PER_S, lambda: len(board.record.resets) > 1)
-    told = [fault for fault in faults_of(device) if fault.code == FaultCode.CRASH]
-    assert told
-    assert told[0].words[4] == 0x20000000
+    reported = [fault for fault in faults_of(device) if fault.code == FaultCode.CRASH]
+    assert reported
+    assert reported[0].words[4] == 0x20000000
 
 
 def test_noise_on_the_line_is_counted_and_nothing_else(image):

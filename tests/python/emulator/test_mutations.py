@@ -78,7 +78,9 @@ def workshop(tmp_path_factory) -> Workshop:
 def test_a_mutant_is_noticed(workshop, name):
     mutation = MUTATIONS[name]
     session = run_session(workshop.mutant(mutation))
-    found = {check.__name__: told for check in CHECKS if (told := check(session)) is not None}
+    found = {
+        check.__name__: reported for check in CHECKS if (reported := check(session)) is not None
+    }
     print(f"{name}: {found}")
     assert mutation["noticed_by"] in found
 
@@ -86,6 +88,6 @@ def test_a_mutant_is_noticed(workshop, name):
 def test_a_stale_protocol_table_is_noticed(workshop):
     model = small_blob(kind="skip")
     assert table_after_upload(workshop.unmutated, model) is None
-    told = table_after_upload(workshop.mutant(STALE_TABLE), model)
-    assert told is not None
-    assert told.startswith("row 0 is") or "never joined" in told or "is (" in told
+    reported = table_after_upload(workshop.mutant(STALE_TABLE), model)
+    assert reported is not None
+    assert reported.startswith("row 0 is") or "never joined" in reported or "is (" in reported

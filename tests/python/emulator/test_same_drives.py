@@ -21,13 +21,13 @@ from eitskin.session.session import Session
 from eitskin.session.settings import SessionSettings
 from eitskin.truth import observe_scene
 
-QUIET, FRAMES = 4, 6
+UNTOUCHED, FRAMES = 4, 6
 SCENE = f"""[scene]
 name = "two presses"
 seed = 4
 rate_hz = {1 / 20.8e-3!r}
 frames = {FRAMES}
-quiet_frames = {QUIET}
+quiet_frames = {UNTOUCHED}
 elements = 2500
 [[touch]]
 radius_mm = 8.0
@@ -46,7 +46,7 @@ snr_db = 60.0
 class Recorded:
     """What a board sent of its tare and from the first followed drive on."""
 
-    quiet: list[RawFrame]
+    untouched: list[RawFrame]
     raw: list[RawFrame]
     drives: list[FollowedTouches]
     touches: list[SolvedTouches]
@@ -58,7 +58,7 @@ class Recorded:
         drives = [one for one in sent if isinstance(one, FollowedTouches)]
         first = drives[0].head.begun
         return cls(
-            [one for one in raw if one.quiet],
+            [one for one in raw if one.untouched],
             [one for one in raw if first <= one.frame < first + FRAMES],
             [one for one in drives if one.frame < first + FRAMES],
             [one for one in sent if isinstance(one, SolvedTouches) and one.frame < first + FRAMES],
@@ -86,7 +86,11 @@ class Given:
 
     def __init__(self, board: Any, elf: Path, given: Recorded) -> None:
         self._engine, self._raw = board.cpu.engine, given.raw
-        self._shown, self._left, self._base = given.quiet[0], [given.quiet[0], *given.quiet], 0
+        self._shown, self._left, self._base = (
+            given.untouched[0],
+            [given.untouched[0], *given.untouched],
+            0,
+        )
         self._tares = False
         listed = subprocess.run(
             ["arm-none-eabi-nm", elf], capture_output=True, text=True, check=True
@@ -128,7 +132,7 @@ def test_both_boards_tell_the_same_of_the_same_volts(tmp_path, cortex_m7):
     scene.write_text(SCENE, encoding="utf-8")
     image = cortex_m7 / "firmware/eitskin_nucleo_f767zi.bin"
     settings = SessionSettings(
-        mode=Stream.RAW | Stream.TOUCHES, report="drive", tare=QUIET, frames=FRAMES
+        mode=Stream.RAW | Stream.TOUCHES, report="drive", tare=UNTOUCHED, frames=FRAMES
     )
     for kind, run in zip(("sim", "emu"), runs, strict=True):
         emulated = kind == "emu"
@@ -140,10 +144,10 @@ def test_both_boards_tell_the_same_of_the_same_volts(tmp_path, cortex_m7):
             for _ in session.messages():
                 pass
     one, other = map(Recorded.read, runs)
-    assert [frame.voltage_v.tobytes() for frame in one.quiet] == [
-        frame.voltage_v.tobytes() for frame in other.quiet
+    assert [frame.voltage_v.tobytes() for frame in one.untouched] == [
+        frame.voltage_v.tobytes() for frame in other.untouched
     ]
     assert one.facts() == other.facts()
     # both fingers, and frames both solved and left to the next
-    assert {len(told.touches) for told in one.drives} == {0, 1, 2}
+    assert {len(reported.touches) for reported in one.drives} == {0, 1, 2}
     assert len(one.raw) == FRAMES and 2 < len(one.touches) < FRAMES

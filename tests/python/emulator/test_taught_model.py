@@ -42,7 +42,9 @@ def simulated_presses(count: int) -> Presses:
         for k, (x, y) in enumerate(place)
     )
     made = simulate(SKIN, opposite(8), TouchSet("presses", 1, scenes))
-    return Presses(opposite(8), np.repeat(made.quiet_v[:1], count, axis=0), made.frames_v, place)
+    return Presses(
+        opposite(8), np.repeat(made.untouched_v[:1], count, axis=0), made.frames_v, place
+    )
 
 
 def test_a_taught_model_is_uploaded_and_streamed(image, tmp_path):

@@ -164,9 +164,9 @@ def test_a_dma_flag_stays_until_it_is_cleared():
         source.replace("if (n == 5) { T_CR1(TIM3_BASE) = 0; T_CR1(TIM2_BASE) = 0; }", "") % CHAIN,
         800,
     )
-    _, count, *told = out(board, 22)
+    _, count, *reported = out(board, 22)
     assert count == 10
-    assert told[2 * 9] - told[0] < 20  # all at once, not one a slot
+    assert reported[2 * 9] - reported[0] < 20  # all at once, not one a slot
 
 
 def test_an_overrun_stops_the_requests():

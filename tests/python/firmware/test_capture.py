@@ -49,7 +49,7 @@ class Capture:
 
     def interrupt(self, slots_done: int, now: int, flags: int = TCIF) -> list[Burst]:
         """The DMA interrupt at ``now``, after ``slots_done`` bursts since the start; what it
-        told."""
+        reported."""
         image, self.bursts = self.image, []
         image.write(NOW, now)
         image.write(CR, (image.read(CR) & ~CT) | (CT if slots_done % 2 else 0))
@@ -74,8 +74,8 @@ def test_bursts_in_time_alternate_between_the_buffers(elf):
     capture = Capture(elf)
     for slot in range(7):
         start = capture.first + SLOT_US * slot
-        told = capture.interrupt(slot + 1, start + BURST_US + 3)
-        assert told == [(start, start + SLOT_US, slot % 2, False)]
+        reported = capture.interrupt(slot + 1, start + BURST_US + 3)
+        assert reported == [(start, start + SLOT_US, slot % 2, False)]
 
 
 @pytest.mark.parametrize("now", [1000, 2**32 - 250])
@@ -88,29 +88,29 @@ def test_a_late_interrupt_tells_each_slot_once_and_only_the_last_is_whole(
     slot = 0
     for skipped in (0, missed, 0, missed):
         last = slot + skipped
-        told = capture.interrupt(last + 1, capture.first + SLOT_US * last + BURST_US + late_us)
+        reported = capture.interrupt(last + 1, capture.first + SLOT_US * last + BURST_US + late_us)
         starts = [(capture.first + SLOT_US * k) % 2**32 for k in range(slot, last + 1)]
-        assert [start for start, *_ in told] == starts
-        assert [next_start for _, next_start, *_ in told] == [
+        assert [start for start, *_ in reported] == starts
+        assert [next_start for _, next_start, *_ in reported] == [
             (start + SLOT_US) % 2**32 for start in starts
         ]
-        assert [lost for *_, lost in told] == [True] * skipped + [False]
-        assert told[-1][2] == last % 2
+        assert [lost for *_, lost in reported] == [True] * skipped + [False]
+        assert reported[-1][2] == last % 2
         slot = last + 1
 
 
 @pytest.mark.parametrize("late_us", [-49, 0, 60])
 def test_at_a_slow_rate_too_where_a_burst_ends_before_its_last_period(elf, late_us):
     capture = Capture(elf, rate=10_000, slot_us=8100)
-    told = capture.interrupt(2, capture.first + 8100 + 8000 + late_us)
-    found = [(start - capture.first, lost) for start, _, _, lost in told]
+    reported = capture.interrupt(2, capture.first + 8100 + 8000 + late_us)
+    found = [(start - capture.first, lost) for start, _, _, lost in reported]
     assert found == [(0, True), (8100, False)]
 
 
 def test_where_clock_and_buffer_disagree_the_buffer_is_believed(elf):
     capture = Capture(elf)
-    told = capture.interrupt(2, capture.first + BURST_US + 1)
-    assert [lost for *_, lost in told] == [True, False] and told[-1][2] == 1
+    reported = capture.interrupt(2, capture.first + BURST_US + 1)
+    assert [lost for *_, lost in reported] == [True, False] and reported[-1][2] == 1
 
 
 @pytest.mark.parametrize("cause", ["transfer error", "overrun"])
@@ -131,8 +131,8 @@ def test_a_failure_is_told_and_the_scan_goes_on_in_the_same_grid(elf, cause):
     assert next_start >= now + 20 and (next_start - capture.first) % SLOT_US == 0
     assert image.read(TIM5_CCR1) == next_start - 1 and image.read(CR) & EN
     assert image.read(ADC_CR2) & 1
-    told = capture.interrupt(1, next_start + BURST_US)
-    assert told == [(next_start, next_start + SLOT_US, 0, False)]
+    reported = capture.interrupt(1, next_start + BURST_US)
+    assert reported == [(next_start, next_start + SLOT_US, 0, False)]
 
 
 @pytest.mark.parametrize(

@@ -49,13 +49,13 @@ def of(kind: type[Kind], packets: Iterable[object]) -> list[Kind]:
 
 
 def volts() -> np.ndarray:
-    """Quiet for longer than the tare takes, then touches of three strengths (k, 208)."""
+    """Untouched for longer than the tare takes, then touches of three strengths (k, 208)."""
     model, _ = load_prebuilt()
     reference = model.golden.reference_v.astype(np.float64)
     change = model.golden.frame_v.astype(np.float64) - reference
-    quiet = TARED_BY_US // FRAME_US + 1
+    untouched = TARED_BY_US // FRAME_US + 1
     return np.vstack(
-        [[reference] * quiet, [reference + strength * change for strength in (0.5, 1.0, 1.4)]]
+        [[reference] * untouched, [reference + strength * change for strength in (0.5, 1.0, 1.4)]]
     )
 
 
@@ -108,10 +108,10 @@ def test_the_scan_keeps_its_time(run):
 
 def test_the_voltages_are_the_skins(run):
     """Amplitudes within half a step of the converter, signs and order as the protocol has them."""
-    quiet = [raw for raw in of(RawFrame, run.packets) if raw.quiet]
-    assert len(quiet) == 8
+    untouched = [raw for raw in of(RawFrame, run.packets) if raw.untouched]
+    assert len(untouched) == 8
     expected = volts()[0]
-    for raw in quiet:
+    for raw in untouched:
         assert not (raw.quality & ~np.uint8(Quality.RECIPROCITY)).any()
         assert np.abs(raw.voltage_v - expected).max() < LSB_V / 2
 
@@ -121,22 +121,22 @@ def test_the_same_bits_as_the_host(run):
     host = CoreEngine(blob)
     host.set_options(board_options(model, of(BoardInfo, run.packets)[-1]))
     raws = of(RawFrame, run.packets)
-    host.set_reference(np.array([raw.voltage_v for raw in raws if raw.quiet], dtype=np.float64))
+    host.set_reference(np.array([raw.voltage_v for raw in raws if raw.untouched], dtype=np.float64))
     images = {one.solved.frame: one for one in of(SolvedImage, run.packets)}
     touches = {one.solved.frame: one for one in of(SolvedTouches, run.packets)}
     assert len(images) >= 8 and images.keys() == touches.keys()
-    last_quiet = max(raw.frame for raw in raws if raw.quiet)
+    last_untouched = max(raw.frame for raw in raws if raw.untouched)
     found = 0
     for raw in raws:
-        if raw.frame <= last_quiet:
+        if raw.frame <= last_untouched:
             continue
         expected = host.reconstruct(raw.voltage_v)
         if raw.frame not in images:
             continue
         board = images.pop(raw.frame)
         assert board.image.tobytes() == expected.image.tobytes(), f"frame {raw.frame}"
-        told = board.solved.stop, board.solved.iterations
-        assert told == (expected.info.stop, expected.info.iterations)
+        reported = board.solved.stop, board.solved.iterations
+        assert reported == (expected.info.stop, expected.info.iterations)
         assert [replace(touch, id=0) for touch in touches[raw.frame].touches] == [
             replace(touch, id=0) for touch in expected.touches
         ]

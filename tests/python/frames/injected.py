@@ -13,7 +13,7 @@ from eitskin.skin.skin import Skin, paper_skin
 
 FloatArray = NDArray[np.float64]
 
-QUIET = 12
+UNTOUCHED = 12
 GAIN = 0.02
 SNR_DB = 60.0
 TOUCHES_MM = ((30.0, 40.0), (-50.0, 10.0))
@@ -28,11 +28,11 @@ def healthy_frames(
     snr_db: float = SNR_DB,
     touches_mm: tuple[tuple[float, float], ...] = TOUCHES_MM,
     transfer_ohm: FloatArray | None = None,
-    quiet: int = QUIET,
+    untouched: int = UNTOUCHED,
 ) -> Frames:
-    """Quiet frames and one frame with touches that change its voltages by at most 5 %.
+    """Untouched frames and one frame with touches that change its voltages by at most 5 %.
 
-    Every channel has a gain of its own (standard deviation ``gain``) and noise at ``snr_db``.
+    Every row has a gain of its own (standard deviation ``gain``) and noise at ``snr_db``.
     """
     rng = np.random.default_rng(seed)
     protocol = adjacent(16) if protocol is None else protocol
@@ -50,7 +50,7 @@ def healthy_frames(
     return Frames(
         protocol=protocol,
         voltage_v=(gains * (clean + change) + sigma * rng.normal(size=len(rows)))[None],
-        reference_voltage_v=gains * clean + sigma * rng.normal(size=(quiet, len(rows))),
+        reference_voltage_v=gains * clean + sigma * rng.normal(size=(untouched, len(rows))),
         touch_frame=np.zeros(len(centres), dtype=np.int64),
         touch_xy_mm=centres,
         touch_radius_mm=radii,
@@ -72,7 +72,7 @@ def changed(frames: Frames, reference: FloatArray, voltage: FloatArray) -> Frame
 def permuted(
     frames: Frames, index: NDArray[np.int64], sign: NDArray[np.int64] | None = None
 ) -> Frames:
-    """Channel r replaced by channel ``index[r]`` times ``sign[r]``, labels left as they are."""
+    """Row r replaced by row ``index[r]`` times ``sign[r]``, labels left as they are."""
     factor = 1.0 if sign is None else sign
     return changed(
         frames, frames.reference_voltage_v[:, index] * factor, frames.voltage_v[:, index] * factor
@@ -80,7 +80,7 @@ def permuted(
 
 
 def times(frames: Frames, gains: FloatArray) -> Frames:
-    """Every channel r times ``gains[r]``."""
+    """Every row r times ``gains[r]``."""
     return changed(frames, frames.reference_voltage_v * gains, frames.voltage_v * gains)
 
 
@@ -97,10 +97,10 @@ def as_if_electrodes(
     return changed(frames, physical.reference_voltage_v, physical.voltage_v)
 
 
-def quiet_only(frames: Frames) -> Frames:
+def untouched_only(frames: Frames) -> Frames:
     """The same voltages without any known touch."""
-    volts, quiet = frames.voltage_v, frames.reference_voltage_v
-    return Frames(frames.protocol, volts, quiet, allow_nonfinite=True)
+    volts, untouched = frames.voltage_v, frames.reference_voltage_v
+    return Frames(frames.protocol, volts, untouched, allow_nonfinite=True)
 
 
 def rotating(frames: Frames) -> Frames:
@@ -118,14 +118,14 @@ def dead(frames: Frames, *electrodes: int) -> Frames:
     return times(frames, np.where(gone, 1e-3, 1.0))
 
 
-def channels_off(frames: Frames, channels: list[int], gain: float) -> Frames:
+def rows_off(frames: Frames, rows: list[int], gain: float) -> Frames:
     gains = np.ones(frames.protocol.n_rows)
-    gains[channels] = gain
+    gains[rows] = gain
     return times(frames, gains)
 
 
 def pair_off(frames: Frames, columns: slice, gain: float) -> Frames:
-    """All channels that drive (columns 0, 1) or measure (2, 3) with the electrodes 3 and 4."""
+    """All rows that drive (columns 0, 1) or measure (2, 3) with the electrodes 3 and 4."""
     of_pair = (frames.protocol.drive_measure[:, columns] == [3, 4]).all(axis=1)
     return times(frames, np.where(of_pair, gain, 1.0))
 

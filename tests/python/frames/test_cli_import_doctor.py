@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from injected import (
     as_if_electrodes,
-    channels_off,
     dead,
     healthy_frames,
     pair_off,
-    quiet_only,
     reversed_sign,
     rotating,
+    rows_off,
     times,
+    untouched_only,
     wired,
 )
 
@@ -71,14 +71,14 @@ FAULTS: dict[str, tuple[Callable[[], Frames], str]] = {
         lambda: reversed_sign(rotating(dead(healthy_frames(7), 4))),
         "--order rotating --sign reversed --drop-electrodes 4",
     ),
-    "one channel": (
-        lambda: channels_off(healthy_frames(8), [40], 1.5), "--impute-channels 40"
+    "one row": (
+        lambda: rows_off(healthy_frames(8), [40], 1.5), "--impute-channels 40"
     ),
     "both of a pair": (
-        lambda: channels_off(healthy_frames(9), [0, 26], 1.5), "--drop-channels 0,26"
+        lambda: rows_off(healthy_frames(9), [0, 26], 1.5), "--drop-channels 0,26"
     ),
     "flipped": (
-        lambda: channels_off(healthy_frames(10), [17, 90], -1.0), "--flip-channels 17,90"
+        lambda: rows_off(healthy_frames(10), [17, 90], -1.0), "--flip-channels 17,90"
     ),
     "own gains": (
         lambda: times(healthy_frames(11), np.random.default_rng(11).uniform(0.8, 1.2, 208)),
@@ -102,7 +102,7 @@ def test_the_advice_mends(tmp_path, capsys, fault):
 def test_numbering_is_advised_by_known_touches_and_mends(tmp_path, capsys):
     (tmp_path / "skin.toml").write_text(SKIN)
     turned = as_if_electrodes(healthy_frames(13), electrode_map(16, 5, True), seed=13)
-    path = write(tmp_path / "s.npz", channels_off(turned, [40], 1.5))
+    path = write(tmp_path / "s.npz", rows_off(turned, [40], 1.5))
     repaired, skin = tmp_path / "repaired.npz", tmp_path / "skin.toml"
     touch = ("--skin", skin, "--touch", "30,40,8", "--touch=-50,10,8", "--touch-in", "0")
     assert run("doctor", path, *NPZ, *touch, "--json") == 11
@@ -135,19 +135,19 @@ def test_import_says_what_it_wrote(tmp_path, capsys):
 
 def test_the_doctor_examines_frames_files_and_prints_evidence(tmp_path, capsys):
     path = tmp_path / "f.npz"
-    save_frames(path, rotating(quiet_only(healthy_frames(15))))
+    save_frames(path, rotating(untouched_only(healthy_frames(15))))
     assert run("doctor", path) == 11
     text = capsys.readouterr().out
     assert "FAULT order" in text
     assert "rotating 0.9" in text
     assert "repair: eitskin import ... --order rotating" in text
-    save_frames(path, quiet_only(healthy_frames(15, opposite(16))))
+    save_frames(path, untouched_only(healthy_frames(15, opposite(16))))
     assert run("doctor", path) == 0
     assert "0 faults, 0 notes: nothing must be repaired" in capsys.readouterr().out
 
 
 def test_sources_with_all_pairs_are_recognised_by_their_number(tmp_path, capsys):
-    frames = quiet_only(healthy_frames(16))
+    frames = untouched_only(healthy_frames(16))
     rows = source_table("rotating-all", frames.protocol)
     values = np.full((len(rows), 2), 0.5)
     measured = ~(rows[:, :2, None] == rows[:, None, 2:]).any(axis=(1, 2))
@@ -163,7 +163,7 @@ def test_sources_with_all_pairs_are_recognised_by_their_number(tmp_path, capsys)
 
 def test_the_picture_is_drawn(tmp_path):
     path = tmp_path / "f.npz"
-    save_frames(path, dead(quiet_only(healthy_frames(17)), 3))
+    save_frames(path, dead(untouched_only(healthy_frames(17)), 3))
     assert run("doctor", path, "--picture", tmp_path / "p.png") == 11
     assert (tmp_path / "p.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     with pytest.raises(EitskinError, match=r"is not a format of a picture; use \.png"):

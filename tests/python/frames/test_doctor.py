@@ -15,13 +15,13 @@ from injected import (
     FloatArray,
     as_if_electrodes,
     changed,
-    channels_off,
     healthy_frames,
     pair_off,
-    quiet_only,
     reversed_sign,
     rotating,
+    rows_off,
     times,
+    untouched_only,
     wired,
 )
 
@@ -108,10 +108,10 @@ def test_finite_element_frames_with_uneven_contacts_raise_no_alarm():
         clean = ForwardModel(mesh, PAPER, adjacent(16), 0.01 * rng.uniform(0.8, 1.2, 16)).voltages(
             0.01
         )
-        quiet = clean * (1 + 0.02 * rng.normal(size=208)) + 1e-3 * np.std(clean) * rng.normal(
+        untouched = clean * (1 + 0.02 * rng.normal(size=208)) + 1e-3 * np.std(clean) * rng.normal(
             size=(8, 208)
         )
-        assert named(report_of(Frames(adjacent(16), quiet[:1], quiet))) == []
+        assert named(report_of(Frames(adjacent(16), untouched[:1], untouched))) == []
 
 
 @by_protocol
@@ -132,11 +132,11 @@ def test_reversed_polarity_is_recognised(protocol):
     assert finding.repair == "--sign reversed"
 
 
-def test_reversed_polarity_is_certain_once_a_channel_crosses_zero():
+def test_reversed_polarity_is_certain_once_a_row_crosses_zero():
     frames = healthy_frames(4)
     voltage = -frames.voltage_v.copy()
     voltage[0, 6] = -0.2 * rms(frames)
-    crossing = quiet_only(changed(frames, -frames.reference_voltage_v, voltage))
+    crossing = untouched_only(changed(frames, -frames.reference_voltage_v, voltage))
     assert only(crossing, "reversed").repair == "--sign reversed"
 
 
@@ -165,22 +165,24 @@ def test_numbering_is_told_by_two_known_touches(rotate, mirror, option):
     assert finding.evidence[option] > 0.98 > finding.evidence["as given"] + 0.05
 
 
-def test_numbering_of_a_symmetric_skin_is_declared_untold_without_a_touch():
+def test_numbering_of_a_symmetric_skin_is_declared_inconclusive_without_a_touch():
     frames = as_if_electrodes(healthy_frames(6), electrode_map(16, 5, True), seed=6)
-    known, unknown_places = report_of(quiet_only(frames)), report_of(frames, None)
+    known, unknown_places = report_of(untouched_only(frames)), report_of(frames, None)
     assert named(known) == []
     for report, option in ((known, "--touch X,Y"), (unknown_places, "--skin")):
-        told = [text for text in report.untold if "in which direction the numbers run" in text]
-        assert any(option in text for text in told)
+        reported = [
+            text for text in report.inconclusive if "in which direction the numbers run" in text
+        ]
+        assert any(option in text for text in reported)
 
 
 def test_one_touch_leaves_its_mirror_image_and_says_so():
     report = report_of(healthy_frames(7, touches_mm=((0.0, 60.0),)))
     assert named(report) == []
-    assert any("fits as given, but --mirror too" in text for text in report.untold)
+    assert any("fits as given, but --mirror too" in text for text in report.inconclusive)
 
 
-def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame():
+def test_numbering_of_an_odd_outline_is_told_by_the_untouched_frame():
     corners = [(-60.0, -40.0), (70.0, -40.0), (70.0, 30.0), (10.0, 60.0), (-60.0, 40.0)]
     skin = Skin("odd", polygon(corners), Electrodes(count=8))
     transfer = homogeneous(skin, 8).transfer_ohm
@@ -188,7 +190,7 @@ def test_numbering_of_an_odd_outline_is_told_by_the_quiet_frame():
     def numbered(moved: FloatArray) -> Frames:
         there = transfer[np.ix_(moved, moved)]
         made = healthy_frames(8, adjacent(8), skin_for(adjacent(8)), transfer_ohm=there)
-        return quiet_only(made)
+        return untouched_only(made)
 
     assert named(report_of(numbered(np.arange(8)), skin)) == []
     for rotate, mirror, option in ((3, False, "--rotate 3"), (1, True, "--rotate 1 --mirror")):
@@ -223,7 +225,7 @@ def test_joined_electrodes_are_named_whatever_their_width(width_mm, known):
     for i, j in combinations(range(16), 2):
         if i not in (0, 5):
             continue
-        joined = quiet_only(healthy_frames(16 * i + j, transfer_ohm=shorted(transfer, i, j)))
+        joined = untouched_only(healthy_frames(16 * i + j, transfer_ohm=shorted(transfer, i, j)))
         finding = only(joined, "shorted-electrodes", skin=PAPER if known else None)
         assert finding.evidence["electrodes"] == [i, j] and finding.repair == ""
 
@@ -257,12 +259,13 @@ def test_every_dead_electrode_is_named_with_its_side(driving, measuring):
 
 
 def test_an_electrode_lost_in_a_frame_is_named():
-    frames = quiet_only(healthy_frames(11))
+    frames = untouched_only(healthy_frames(11))
     voltage = frames.voltage_v.copy()
     voltage[:, (ROWS[:, :2] == 7).any(axis=1)] *= 1e-3
     finding = only(changed(frames, frames.reference_voltage_v, voltage), "electrode-lost")
     assert finding.evidence["electrode"] == 7 and finding.evidence["frames"] == [0]
-    # and beside a channel of it that is dead in the quiet frames too, so that no part of it is left
+    # and beside a row of it that is dead in the untouched frames too, so that no part of it is
+    # left
     dead = int(np.flatnonzero((ROWS[:, :2] == 7).any(axis=1))[3])
     reference = frames.reference_voltage_v.copy()
     reference[:, dead] = voltage[:, dead] = 0
@@ -271,7 +274,7 @@ def test_an_electrode_lost_in_a_frame_is_named():
 
 
 @pytest.mark.parametrize("quantile", (0.9, 0.99))
-def test_saturated_channels_are_named(quantile):
+def test_saturated_rows_are_named(quantile):
     frames = healthy_frames(12)
     rail = float(np.quantile(np.abs(frames.reference_voltage_v), quantile))
     reference = np.clip(frames.reference_voltage_v, -rail, rail)
@@ -284,26 +287,26 @@ def test_saturated_channels_are_named(quantile):
 
 
 @pytest.mark.parametrize(
-    ("channels", "noise", "name", "repair"),
+    ("rows", "noise", "name", "repair"),
     [
         ([77], 20e-3, "noisy-channels", "--impute-channels 77"),
         ([13], 0.0, "stuck", "--impute-channels 13"),
         (np.flatnonzero((ROWS == 5).any(axis=1)), 20e-3, "noisy-channels", "--drop-electrodes 5"),
     ],
-    ids=["a noisy channel", "a stuck one", "a noisy electrode"],
+    ids=["a noisy row", "a stuck one", "a noisy electrode"],
 )
-def test_noise_of_its_own_and_none_are_named(channels, noise, name, repair):
+def test_noise_of_its_own_and_none_are_named(rows, noise, name, repair):
     frames, rng = healthy_frames(13), np.random.default_rng(13)
     reference = frames.reference_voltage_v.copy()
-    own = noise * rms(frames) * rng.normal(size=(len(reference), len(channels)))
-    reference[:, channels] = own + (reference[:, channels] if noise else reference[0, channels])
+    own = noise * rms(frames) * rng.normal(size=(len(reference), len(rows)))
+    reference[:, rows] = own + (reference[:, rows] if noise else reference[0, rows])
     finding = only(changed(frames, reference, frames.voltage_v), name)
-    assert finding.evidence["channels"] == list(channels) and finding.repair == repair
+    assert finding.evidence["channels"] == list(rows) and finding.repair == repair
 
 
 @pytest.mark.parametrize(("snr_db", "severity"), [(40.0, "note"), (20.0, "fault")])
 def test_the_snr_is_measured_and_judged(snr_db, severity):
-    report = report_of(quiet_only(healthy_frames(14, snr_db=snr_db, quiet=60, gain=0.0)))
+    report = report_of(untouched_only(healthy_frames(14, snr_db=snr_db, untouched=60, gain=0.0)))
     assert named(report) == [("snr", severity)]
     assert report.measured["snr_db"] == pytest.approx(snr_db, abs=0.5)
 
@@ -319,7 +322,7 @@ def test_drift_is_measured_and_judged(drift, severity):
 
 def test_gain_faults_are_told_apart():
     frames = healthy_frames(16)
-    finding = only(channels_off(frames, [40], 1.4), "channel-gain")
+    finding = only(rows_off(frames, [40], 1.4), "channel-gain")
     assert finding.evidence["channels"] == [40] and finding.repair == "--impute-channels 40"
     assert finding.evidence["worst_gain"] == pytest.approx(1.4, rel=0.1)
     for name, columns, gain in (("drive", slice(0, 2), 0.7), ("measure", slice(2, 4), 1.3)):
@@ -335,14 +338,14 @@ def test_gain_faults_are_told_apart():
 
 def test_a_pair_that_breaks_reciprocity_is_named():
     assert ROWS[3].tolist() == [0, 1, 5, 6] and ROWS[65].tolist() == [5, 6, 0, 1]
-    frames = channels_off(channels_off(healthy_frames(17, gain=0.005), [3], 1.18), [65], 0.86)
+    frames = rows_off(rows_off(healthy_frames(17, gain=0.005), [3], 1.18), [65], 0.86)
     finding = only(frames, "reciprocity-pairs")
     assert list(finding.evidence["errors"]) == ["3/65"]
     assert finding.evidence["errors"]["3/65"] == pytest.approx(0.32 / 1.02, rel=0.1)
     assert finding.evidence["off"] == [3]
 
 
-def test_channels_of_the_wrong_sign_are_named():
+def test_rows_of_the_wrong_sign_are_named():
     finding = only(pair_off(healthy_frames(18), slice(0, 2), -1.0), "flipped-channels")
     assert "drive [3, 4]" in finding.text
     of_pair = (ROWS[:, :2] == [3, 4]).all(axis=1)
@@ -353,16 +356,16 @@ def test_values_that_are_no_numbers_are_counted_and_named():
     frames = healthy_frames(19)
     reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
     reference[3, 13], voltage[0, 100] = np.nan, np.inf
-    finding = only(quiet_only(changed(frames, reference, voltage)), "not-finite")
+    finding = only(untouched_only(changed(frames, reference, voltage)), "not-finite")
     assert finding.evidence == {"channels": [13, 100], "frames": ["0"], "quiet_frames": [3]}
 
 
 def test_frames_that_cannot_be_examined_say_only_that():
     frames, rng = healthy_frames(20), np.random.default_rng(20)
     only(times(frames, np.float64(0)), "no-signal")
-    noise = changed(quiet_only(frames), np.abs(rng.normal(size=208))[None], np.zeros((0, 208)))
+    noise = changed(untouched_only(frames), np.abs(rng.normal(size=208))[None], np.zeros((0, 208)))
     assert "unlike-a-homogeneous-skin" in dict(named(report_of(noise)))
-    imaginary = quiet_only(changed(frames, frames.reference_voltage_v, -0.4 * frames.voltage_v))
+    imaginary = untouched_only(changed(frames, frames.reference_voltage_v, -0.4 * frames.voltage_v))
     finding = only(imaginary, "frames-unlike-the-reference")
     assert finding.evidence["frames"] == ["0"] and "--complex-part" in finding.text
 
@@ -372,23 +375,26 @@ def test_a_wrong_unit_is_noted():
     assert finding.evidence["reference_per_predicted"] == pytest.approx(1000, rel=0.05)
 
 
-def test_one_quiet_frame_leaves_noise_untold():
-    report = report_of(healthy_frames(22, quiet=1))
+def test_one_untouched_frame_leaves_noise_inconclusive():
+    report = report_of(healthy_frames(22, untouched=1))
     assert named(report) == [] and "snr_db" not in report.measured
-    assert any(text.startswith("noise, SNR and drift: 1 quiet frame(s)") for text in report.untold)
+    assert any(
+        text.startswith("noise, SNR and drift: 1 untouched frame(s)")
+        for text in report.inconclusive
+    )
 
 
-def stuck(frames: Frames, channels: list[int]) -> Frames:
-    """Channels that give one value in every untouched frame and in the others."""
+def stuck(frames: Frames, rows: list[int]) -> Frames:
+    """Rows that give one value in every untouched frame and in the others."""
     reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
-    reference[:, channels] = voltage[:, channels] = 1e-4
+    reference[:, rows] = voltage[:, rows] = 1e-4
     return changed(frames, reference, voltage)
 
 
-def not_finite(frames: Frames, channels: list[int]) -> Frames:
+def not_finite(frames: Frames, rows: list[int]) -> Frames:
     """NaN in the first untouched frame."""
     reference = frames.reference_voltage_v.copy()
-    reference[0, channels] = np.nan
+    reference[0, rows] = np.nan
     return changed(frames, reference, frames.voltage_v)
 
 
@@ -396,14 +402,14 @@ SEVERAL = {
     "two pairs of exchanged wires": (
         lambda: wired(8, (3, 9), (1, 14)), "swapped-electrodes", "--swap 3,9 --swap 1,14",
     ),
-    "two channels of the wrong sign": (
-        lambda: channels_off(healthy_frames(12), [17, 90], -1.0),
+    "two rows of the wrong sign": (
+        lambda: rows_off(healthy_frames(12), [17, 90], -1.0),
         "flipped-channels", "--flip-channels 17,90",
     ),
-    "two stuck channels": (
+    "two stuck rows": (
         lambda: stuck(healthy_frames(22), [4, 60]), "stuck", "--impute-channels 4,60",
     ),
-    "three channels with numbers that are not finite": (
+    "three rows with numbers that are not finite": (
         lambda: not_finite(healthy_frames(20), [3, 4, 8]),
         "not-finite", "--impute-channels 3,4,8",
     ),
@@ -457,7 +463,7 @@ def test_a_round_skin_needs_no_scipy():
     ],
 )
 def test_remedies_become_one(remedies, combined):
-    """Channel 26 is the reciprocal of channel 0: neither is filled from the other where both are
-    bad, and the channels of an electrode that goes are not named."""
+    """Row 26 is the reciprocal of row 0: neither is filled from the other where both are
+    bad, and the rows of an electrode that goes are not named."""
     case = SimpleNamespace(rows=adjacent(16).drive_measure, n_electrodes=16)
     assert combined_remedy(case, remedies) == combined

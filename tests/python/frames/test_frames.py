@@ -12,14 +12,14 @@ from eitskin.frames.paths import Paths
 from eitskin.skin.protocol import adjacent, in_order
 
 PROTOCOL = in_order(adjacent(8, current_a=2e-3), "by 3")
-CHANNELS = 40
+ROWS = 40
 
 
 def make_frames(**changes: Any) -> Frames:
     rng = np.random.default_rng(1)
     fields: dict[str, Any] = {
-        "protocol": PROTOCOL, "voltage_v": rng.normal(size=(3, CHANNELS)),
-        "reference_voltage_v": rng.normal(size=(5, CHANNELS)), "frame_name": ("a", "b", "ü"),
+        "protocol": PROTOCOL, "voltage_v": rng.normal(size=(3, ROWS)),
+        "reference_voltage_v": rng.normal(size=(5, ROWS)), "frame_name": ("a", "b", "ü"),
         "time_s": np.array([0.0, 0.1, 0.25]), "touch_frame": np.array([0, 2, 2]),
         "touch_xy_mm": np.array([[0.0, 1.0], [2.0, 3.0], [-4.0, 5.5]]),
         "touch_radius_mm": np.array([6.0, 7.0, 8.0]),
@@ -69,18 +69,18 @@ def test_a_failed_save_leaves_the_old_file(tmp_path):
     path = tmp_path / "f.npz"
     save_frames(path, make_frames())
     before = path.read_bytes()
-    bad = np.zeros((3, CHANNELS))
+    bad = np.zeros((3, ROWS))
     bad[1, 7] = np.nan
-    with pytest.raises(FrameError, match="frame 1, channel 7 is nan"):
+    with pytest.raises(FrameError, match="frame 1, row 7 is nan"):
         save_frames(path, make_frames(voltage_v=bad, allow_nonfinite=True))
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["f.npz"]
 
 
 def test_one_reference_frame_becomes_a_row_and_names_are_counted():
-    frames = make_frames(reference_voltage_v=np.ones(CHANNELS), frame_name=())
-    assert frames.reference_voltage_v.shape == (1, CHANNELS)
-    assert frames.reference_v.tolist() == [1.0] * CHANNELS
+    frames = make_frames(reference_voltage_v=np.ones(ROWS), frame_name=())
+    assert frames.reference_voltage_v.shape == (1, ROWS)
+    assert frames.reference_v.tolist() == [1.0] * ROWS
     assert frames.frame_name == ("0", "1", "2")
     with pytest.raises(ValueError):
         frames.voltage_v[0, 0] = 1.0
@@ -90,14 +90,14 @@ def test_one_reference_frame_becomes_a_row_and_names_are_counted():
     ("change", "said"),
     [
         ({"voltage_v": np.zeros((3, 41))}, r"voltage_v has shape \(3, 41\)"),
-        ({"voltage_v": np.zeros((3, CHANNELS), dtype=complex)},
+        ({"voltage_v": np.zeros((3, ROWS), dtype=complex)},
          "must be real numbers, not complex128"),
-        ({"voltage_v": np.full((3, CHANNELS), np.inf)}, "frame 0, channel 0 is inf"),
-        ({"reference_voltage_v": np.zeros((0, CHANNELS))}, "at least one quiet frame"),
+        ({"voltage_v": np.full((3, ROWS), np.inf)}, "frame 0, row 0 is inf"),
+        ({"reference_voltage_v": np.zeros((0, ROWS))}, "at least one untouched frame"),
         ({"frame_name": ("a",)}, "1 names for 3 frames"),
         ({"time_s": np.zeros(2)}, "time_s has shape"),
         ({"row_time_s": np.zeros(2)}, "row_time_s has shape"),
-        ({"row_time_s": np.full(CHANNELS, np.nan)}, "row_time_s: frame 0, channel 0 is nan"),
+        ({"row_time_s": np.full(ROWS, np.nan)}, "row_time_s: frame 0, row 0 is nan"),
         ({"touch_frame": np.array([0, 3, 1])}, "there are 0 to 2"),
         ({"touch_frame": np.array([0.5, 1, 1])}, "whole numbers"),
         ({"touch_frame": None}, "touch_xy_mm without touch_frame"),
@@ -134,9 +134,9 @@ def rewritten(path: Path, **changes: Any) -> Path:
         ({"extra": np.zeros(2)}, "unknown field 'extra'"),
         ({"meta": np.array("{")}, "'meta' is not JSON"),
         ({"meta": np.array("[1]")}, "'meta' is not a JSON object"),
-        ({"drive_measure": np.zeros((CHANNELS, 4), dtype=int)},
+        ({"drive_measure": np.zeros((ROWS, 4), dtype=int)},
          "pair of one|two different|electrode"),
-        ({"drive_measure": np.zeros((CHANNELS, 3), dtype=int)}, "table"),
+        ({"drive_measure": np.zeros((ROWS, 3), dtype=int)}, "table"),
         ({"n_electrodes": np.array(6)}, "electrode"),
         ({"current_a": np.array(0.0)}, "current_a"),
         ({"current_a": np.array("abc")}, "wrong type|current"),
@@ -191,9 +191,9 @@ def test_damaged_files_are_refused(tmp_path):
 
 
 def test_nonfinite_frames_load_only_for_the_doctor(tmp_path):
-    bad = np.zeros((3, CHANNELS))
+    bad = np.zeros((3, ROWS))
     bad[2, 3] = np.inf
     path = rewritten(tmp_path / "f.npz", voltage_v=bad)
-    with pytest.raises(FrameError, match="frame 2, channel 3"):
+    with pytest.raises(FrameError, match="frame 2, row 3"):
         load_frames(path)
     assert np.isinf(load_frames(path, allow_nonfinite=True).voltage_v[2, 3])

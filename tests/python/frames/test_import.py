@@ -92,8 +92,8 @@ def test_a_table_of_the_source_or_of_a_file_is_followed(tmp_path):
 def test_signs_come_back(tmp_path, protocol, sign):
     frames = healthy_frames(3, protocol)
     change = np.abs if sign == "magnitude" else np.negative
-    volts, quiet = change(frames.voltage_v), change(frames.reference_voltage_v)
-    path = source(tmp_path, replace(frames, voltage_v=volts, reference_voltage_v=quiet))
+    volts, untouched = change(frames.voltage_v), change(frames.reference_voltage_v)
+    path = source(tmp_path, replace(frames, voltage_v=volts, reference_voltage_v=untouched))
     assert_same(taken(path, protocol, sign=sign), frames)
 
 
@@ -151,7 +151,7 @@ def test_bad_values_pass_only_where_they_are_mended(tmp_path):
     np.savez(path, v=voltage, r=frames.reference_voltage_v)
     with pytest.raises(FrameError, match=r"frame 0, row 0 \(from 0\) is nan"):
         taken(path)
-    with pytest.raises(FrameError, match="frame 0, channel 0 is nan"):
+    with pytest.raises(FrameError, match="frame 0, row 0 is nan"):
         taken(path, impute_channels=(3,))
     repaired = taken(path, impute_channels=(0,))
     assert repaired.voltage_v[0, 0] == voltage[0, 26]
@@ -170,34 +170,34 @@ def test_equalised_gains_follow_the_prediction(tmp_path):
     weak[:, 40] *= 0.01
     np.savez(tmp_path / "weak.npz", v=frames.voltage_v, r=weak)
     with pytest.raises(
-        FrameError, match=r"channel 40 has 0\.0\d+ of its predicted reference \(1 such\)"
+        FrameError, match=r"row 40 has 0\.0\d+ of its predicted reference \(1 such\)"
     ):
         taken(tmp_path / "weak.npz", equalise=True)
 
 
 def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path):
     frames = healthy_frames(10)
-    quiet, voltage = frames.reference_voltage_v, frames.voltage_v
+    untouched, voltage = frames.reference_voltage_v, frames.voltage_v
     rows = tmp_path / "rows.csv"
-    three = np.vstack([quiet[0], quiet[1], voltage]).T
+    three = np.vstack([untouched[0], untouched[1], voltage]).T
     np.savetxt(rows, three, delimiter=";", header="q0;q1;one", comments="", fmt="%.17g")
     options = SourceOptions(columns="one", reference_columns="q0,q1", scale=1.0)
     got = taken(rows, source=options)
     assert got.frame_name == ("one",) and len(got.reference_voltage_v) == 2
     assert np.array_equal(got.voltage_v, voltage)
-    assert np.array_equal(got.reference_voltage_v, quiet[:2])
+    assert np.array_equal(got.reference_voltage_v, untouched[:2])
     wide = tmp_path / "wide.csv"
-    times = np.arange(len(quiet) + 1) * 0.25
+    times = np.arange(len(untouched) + 1) * 0.25
     np.savetxt(
         wide,
-        np.column_stack([times, 1000 * np.vstack([quiet, voltage])]),
+        np.column_stack([times, 1000 * np.vstack([untouched, voltage])]),
         delimiter=",",
         fmt="%.17g",
     )
     options = SourceOptions(columns="1:209", time="0", reference_frames="0:12", scale=1e-3)
     got = taken(wide, source=options)
     assert np.allclose(got.voltage_v, voltage, rtol=1e-12)
-    assert np.allclose(got.reference_voltage_v, quiet, rtol=1e-12)
+    assert np.allclose(got.reference_voltage_v, untouched, rtol=1e-12)
     assert got.time_s is not None and got.time_s.tolist() == [3.0]
     assert got.meta["unit"] == "V" and got.meta["options"]["scale"] == 1e-3
     with pytest.raises(
@@ -210,18 +210,20 @@ def test_text_with_channels_in_rows_or_frames_in_rows(tmp_path):
 def test_complex_parts_of_arrays_and_column_pairs(tmp_path, part):
     frames = healthy_frames(11)
     phase = np.exp(0.4j)
-    voltage, quiet = frames.voltage_v * phase, frames.reference_voltage_v * phase
+    voltage, untouched = frames.voltage_v * phase, frames.reference_voltage_v * phase
     wanted = {
         "real": np.real,
         "imag": np.imag,
         "abs": np.abs,
         "in-phase": lambda z: np.real(z / phase),
     }[part]
-    np.savez(tmp_path / "z.npz", v=voltage, r=quiet)
+    np.savez(tmp_path / "z.npz", v=voltage, r=untouched)
     source_of = replace(KEYS, complex_part=part)
     got = taken(tmp_path / "z.npz", source=source_of)
     assert np.allclose(got.voltage_v, wanted(voltage), rtol=1e-9)
-    pairs = np.column_stack([quiet[0].real, quiet[0].imag, voltage[0].real, voltage[0].imag])
+    pairs = np.column_stack(
+        [untouched[0].real, untouched[0].imag, voltage[0].real, voltage[0].imag]
+    )
     np.savetxt(tmp_path / "z.csv", pairs, delimiter=",", fmt="%.17g")
     columns = SourceOptions(
         columns="2,3", reference_columns="0,1", complex_part=part, pairs="real-imag"
@@ -300,7 +302,7 @@ def test_a_frames_file_is_mended_and_keeps_its_truth(tmp_path):
 
 
 NPZ = r"no array 'x' .*r \(12, 208\), v \(1, 208\)"
-QUIET = "which frames are quiet: --reference KEY"
+UNTOUCHED = "which frames are untouched: --reference KEY"
 
 
 @pytest.mark.parametrize(
@@ -308,7 +310,7 @@ QUIET = "which frames are quiet: --reference KEY"
     [
         (SourceOptions(voltage="x"), {}, ADJACENT, NPZ),
         (SourceOptions(), {}, ADJACENT, "--voltage KEY"),
-        (SourceOptions(voltage="v"), {}, ADJACENT, QUIET),
+        (SourceOptions(voltage="v"), {}, ADJACENT, UNTOUCHED),
         (replace(KEYS, columns="1"), {}, ADJACENT, "--columns does not go with a NPZ"),
         (KEYS, {}, adjacent(8), r"v \(1, 208\): a frame should have 40 channels"),
         (KEYS, {"order": "fixed-all"}, ADJACENT, "should have 256 channels"),

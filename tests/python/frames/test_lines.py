@@ -62,8 +62,10 @@ def test_frames_over_several_lines(tmp_path):
     (tmp_path / "v.txt").write_text(text)
     assert np.array_equal(taken(tmp_path / "v.txt", label="frame"), volts)
     reader = LineReader(LineFormat("comma", "frame"), wanted=4)
-    told = [reader.feed(n, line) for n, line in enumerate(("frame 7", "1,2,", "3,4,", "5,6", ""))]
-    found = [[row.cells for row in rows] for rows in told]
+    reported = [
+        reader.feed(n, line) for n, line in enumerate(("frame 7", "1,2,", "3,4,", "5,6", ""))
+    ]
+    found = [[row.cells for row in rows] for rows in reported]
     assert found == [[], [], [("1", "2", "3", "4")], [], []]
 
 

@@ -25,7 +25,7 @@ FIELDS = {
 def results() -> dict[int, Reconstruction]:
     """Frames 2, 0 and 9, asked for in this order."""
     reconstructor = Reconstructor(prebuilt()[0])
-    reconstructor.tare(session().quiet_v)
+    reconstructor.tare(session().untouched_v)
     return {number: reconstructor.reconstruct(session().frames_v[number]) for number in (2, 0, 9)}
 
 
@@ -110,9 +110,9 @@ def test_no_results(tmp_path):
 
 def test_frames_without_touches(tmp_path):
     reconstructor = Reconstructor(prebuilt()[0])
-    reconstructor.tare(session().quiet_v)
-    quiet = {0: reconstructor.reconstruct(session().reference_v)}
-    save_results(tmp_path / "out.npz", prebuilt()[0], session().as_frames(), quiet)
+    reconstructor.tare(session().untouched_v)
+    untouched = {0: reconstructor.reconstruct(session().reference_v)}
+    save_results(tmp_path / "out.npz", prebuilt()[0], session().as_frames(), untouched)
     with np.load(tmp_path / "out.npz") as saved:
         assert saved["touch_frame"].shape == (0,) and not np.nansum(saved["image_s_per_m"])
 

@@ -20,7 +20,7 @@ from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import paper_skin
 from small_models import prebuilt
 
-SEED, COUNT, QUIET = 9, 6, 16
+SEED, COUNT, UNTOUCHED = 9, 6, 16
 SNR = 1e3  # rms(V0) / sigma: 60 dB
 ELECTRODES = 16
 ROWS = adjacent(ELECTRODES).drive_measure.astype(np.int64)
@@ -44,7 +44,8 @@ def frames_of(
     rate_hz: float = 20.0,
     frames: int = 1,
 ) -> np.ndarray:
-    """One quiet frame of scene k, then ``frames`` touched ones (frames + 1, m) V, without noise."""
+    """One untouched frame of scene k, then ``frames`` touched ones (frames + 1, m) V, without
+    noise."""
     touches = [
         {"radius_mm": t.radius_mm, "x_mm": t.x_mm, "y_mm": t.y_mm, "contrast": t.contrast}
         for t in scenes()[k].touches
@@ -72,10 +73,10 @@ def simulated() -> list[dict[str, np.ndarray]]:
     on."""
     found = []
     for k in range(COUNT):
-        quiet, touched = frames_of(k, {})
+        untouched, touched = frames_of(k, {})
         pair, apart = ([k % ELECTRODES, (k + by) % ELECTRODES] for by in (1, 4))
         off = {"detached": {"electrodes": pair[:1]}}
-        one = {"quiet": quiet, "touched": touched, "detached": frames_of(k, off)[-1]}
+        one = {"quiet": untouched, "touched": touched, "detached": frames_of(k, off)[-1]}
         for name, of in (("", pair), (" apart", apart)):
             bridge = {"bridged": {"electrodes": of, "resistance_ohm": 10.0}}
             one[f"bridged{name}"] = frames_of(k, bridge)[-1]
@@ -94,7 +95,7 @@ def noisy(k: int, frame: np.ndarray, stream: int) -> np.ndarray:
 
 
 def quiet_frames(k: int) -> np.ndarray:
-    return noisy(k, np.tile(simulated()[k]["quiet"], (QUIET, 1)), 0)
+    return noisy(k, np.tile(simulated()[k]["quiet"], (UNTOUCHED, 1)), 0)
 
 
 def touched(k: int) -> np.ndarray:
@@ -104,7 +105,7 @@ def touched(k: int) -> np.ndarray:
 def played(
     frames: Callable[[int], Sequence[np.ndarray] | np.ndarray],
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """By scene: its quiet frames, and what ``frames`` gives for it."""
+    """By scene: its untouched frames, and what ``frames`` gives for it."""
     return [(quiet_frames(k), np.array(frames(k))) for k in range(COUNT)]
 
 

@@ -46,7 +46,7 @@ class HardSkin:
     model: Model
     blob: bytes
 
-    def quiet_v(self, count: int, noise: float = 1e-3) -> np.ndarray:
+    def untouched_v(self, count: int, noise: float = 1e-3) -> np.ndarray:
         """(count, m) V with white noise of so much of rms(V0)."""
         return self._noisy(np.tile(self.linear.v0_v, (count, 1)), 1, noise)
 

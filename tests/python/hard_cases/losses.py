@@ -23,22 +23,22 @@ UNITS = {
 
 
 def steps_of(kind: str, level: float) -> list[Step]:
-    """Tare on quiet frames that are as bad as the frames, then the frames; each level's lost rows
-    are among the next one's."""
+    """Tare on untouched frames that are as bad as the frames, then the frames; each level's lost
+    rows are among the next one's."""
     s, rng = small(), np.random.default_rng(83)
     v0, frames = s.linear.v0_v, s.frames(81, COUNT, noise=0.0)
     sigma = (level if kind == "noise" else 0.0) * float(np.sqrt(np.mean(v0**2)))
     noise = rng.standard_normal(frames.shape)
-    quiet = s.quiet(84, 32, 0.0) + sigma * rng.standard_normal((32, len(v0)))
+    untouched = s.untouched(84, 32, 0.0) + sigma * rng.standard_normal((32, len(v0)))
     frames = frames + sigma * noise
     if kind == "bits":
         step = 2 * 1.25 * float(np.abs(v0).max()) / 2**level
-        frames, quiet = np.round(frames / step) * step, np.round(quiet / step) * step
+        frames, untouched = np.round(frames / step) * step, np.round(untouched / step) * step
     lost = np.random.default_rng(82).permutation(s.protocol.n_rows)
     masked = np.isin(np.arange(len(v0)), lost[: int(level) if kind == "rows left out" else 0])
     # linear answers are no sheet's, and rows would be left out
     options = replace(default_options(small_model()), diagnostics=0)
-    return [Load(small_blob()), Choose(options), Mask(masked), TareStep(quiet), Play(frames)]
+    return [Load(small_blob()), Choose(options), Mask(masked), TareStep(untouched), Play(frames)]
 
 
 def all_steps() -> list[Step]:

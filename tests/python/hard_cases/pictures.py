@@ -39,7 +39,7 @@ def panel(group: str, which: int, sign: str, title: str) -> Panel:
     model, blob = prebuilt()
     options = replace(default_options(model), sign=sign)
     frames = frames_of(group)[which : which + 1]
-    tare = TareStep(touch_scenes.simulated().quiet_v)
+    tare = TareStep(touch_scenes.simulated().untouched_v)
     _, (one,) = on_host([Load(blob), Choose(options), tare, Play(frames)])
     sheet = model.skin.conductivity_s_per_m
     truth = tuple(

@@ -45,7 +45,7 @@ def check_left_out(margins: Margins, case: str, one: Outcome, *electrodes: int) 
 
 
 def test_detached(same_everywhere, margins):
-    """Its number is told, and its 52 rows are left out."""
+    """Its number is reported, and its 52 rows are left out."""
     for k, (_, one) in enumerate(compare(same_everywhere, lambda k, _: simulated()[k]["detached"])):
         assert one.info.open_electrodes == (k % ELECTRODES,) and not one.info.bridged_electrodes
         check_left_out(margins, "frames/detached", one, k % ELECTRODES)

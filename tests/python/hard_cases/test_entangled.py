@@ -44,7 +44,7 @@ def test_touches_in_each_others_field(same_everywhere, margins):
     """Same bits everywhere, finite, on the skin, within max_touches; two that overlap lie within
     the outline of both."""
     model, blob = prebuilt()
-    steps: list[Step] = [Load(blob), TareStep(touch_scenes.simulated().quiet_v)]
+    steps: list[Step] = [Load(blob), TareStep(touch_scenes.simulated().untouched_v)]
     frames, chosen = frames_of("entangled"), searches()
     for options in chosen:
         steps += [Choose(options), Forget(), Play(frames)]

@@ -14,12 +14,12 @@ from touch_scenes import (
     CONTRASTS,
     PRESS_PLACES,
     PRESSES,
-    QUIET_TRIALS,
     RIM_MM,
+    UNTOUCHED_TRIALS,
     crowds,
     frames_of,
     groups,
-    quiet_trials,
+    untouched_trials,
 )
 
 from eitskin.core.diagnostics_table import Touch as Found
@@ -35,11 +35,16 @@ from small_models import prebuilt
 def reconstruct(
     same_everywhere: SameEverywhere, frames: np.ndarray, sign: str = "increase"
 ) -> list[Outcome]:
-    """Frames after a tare on the scenes' quiet frames; every number finite, no more touches than
-    asked for."""
+    """Frames after a tare on the scenes' untouched frames; every number finite, no more touches
+    than asked for."""
     model, blob = prebuilt()
     options = replace(default_options(model), sign=sign)
-    steps = [Load(blob), Choose(options), TareStep(touch_scenes.simulated().quiet_v), Play(frames)]
+    steps = [
+        Load(blob),
+        Choose(options),
+        TareStep(touch_scenes.simulated().untouched_v),
+        Play(frames),
+    ]
     statuses, outcomes = same_everywhere.steps(steps)
     assert set(statuses) == {0}
     assert all(
@@ -203,15 +208,15 @@ def test_insulating_under_the_other_sign(same_everywhere, margins):
 
 
 def test_light_presses(same_everywhere, margins):
-    """At the gate, 1.2 times the greatest correlation of 32 quiet frames: of 200 quiet frames at
-    most 2 % are taken for a touch; as the press grows it is detected no less often, and in all
-    places from twice the gate on."""
+    """At the gate, 1.2 times the greatest correlation of 32 untouched frames: of 200 untouched
+    frames at most 2 % are taken for a touch; as the press grows it is detected no less often, and
+    in all places from twice the gate on."""
     case = "physics/light-presses"
-    quiet = reconstruct(same_everywhere, quiet_trials())
+    untouched = reconstruct(same_everywhere, untouched_trials())
     margins.everywhere(
         case,
         "false alarms",
-        sum(bool(one.touches) for one in quiet) / QUIET_TRIALS,
+        sum(bool(one.touches) for one in untouched) / UNTOUCHED_TRIALS,
         0.02,
         "of the frames",
     )

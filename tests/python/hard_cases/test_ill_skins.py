@@ -18,13 +18,13 @@ FRAMES = 2
 
 
 def steps_for(h: HardSkin, options: Options) -> list[Step]:
-    return [Load(h.blob), Choose(options), TareStep(h.quiet_v(8)), Play(h.frames_v(FRAMES))]
+    return [Load(h.blob), Choose(options), TareStep(h.untouched_v(8)), Play(h.frames_v(FRAMES))]
 
 
 def data_of(h: HardSkin, options: Options, width: str) -> list[np.ndarray]:
     """y of each frame, (r,), in float64."""
     host = Host(h.blob, width)
-    taken = [host.status_of(s) for s in (Choose(options), TareStep(as_float32(h.quiet_v(8))))]
+    taken = [host.status_of(s) for s in (Choose(options), TareStep(as_float32(h.untouched_v(8))))]
     assert taken == [0, 0]
     data = []
     for frame in as_float32(h.frames_v(FRAMES)):
@@ -34,7 +34,7 @@ def data_of(h: HardSkin, options: Options, width: str) -> list[np.ndarray]:
 
 
 def rounding_of_data(h: HardSkin) -> float:
-    """|P| times what a row's datum may be off: 8 roundings of the mean of 8 quiet frames, 4 of
+    """|P| times what a row's datum may be off: 8 roundings of the mean of 8 untouched frames, 4 of
     difference, gain and product, and k of a row of P: (12 + k) u |v| over k folded rows."""
     k = len(h.model.v_ref_v)
     norm = float(np.linalg.norm(h.model.projection.astype(np.float64), 2))

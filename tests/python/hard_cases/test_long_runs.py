@@ -54,9 +54,9 @@ def test_warm_frames(same_everywhere, margins, solver):
     Lifted off, it is gone in the next frame: no ghost.
     """
     s, within = small(), margins.of(WARM_CASE)
-    quiet, (touched,), after = s.quiet(93, 16), s.frames(92, 1), s.quiet(94, 3)
+    untouched, (touched,), after = s.untouched(93, 16), s.frames(92, 1), s.untouched(94, 3)
     options = replace(default_options(small_model()), solver=solver, warm_start=True, iterations=20)
-    head: list[Step] = [Load(small_blob()), Choose(options), TareStep(quiet)]
+    head: list[Step] = [Load(small_blob()), Choose(options), TareStep(untouched)]
     streams = [
         [*head, Play(np.vstack([np.tile(touched, (held, 1)), after]))] for held in (FEW, HELD)
     ]

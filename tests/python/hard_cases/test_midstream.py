@@ -34,9 +34,9 @@ def test_model_swapped(same_everywhere, margins):
     """A second model takes the first one's memory: until it has a reference of its own no frame is
     taken; then nothing is left of the first, whatever its storage, data and size."""
     s, other = small(), small("l")
-    quiet, frames = s.quiet(101, 8), s.frames(100, 2)
+    untouched, frames = s.untouched(101, 8), s.frames(100, 2)
     streams = [
-        (blob, quiet, frames)
+        (blob, untouched, frames)
         for blob in (
             small_blob("i8"),
             small_blob("f16", "normalised"),
@@ -44,12 +44,12 @@ def test_model_swapped(same_everywhere, margins):
             small_blob("i16", "log-ratio"),
         )
     ]
-    streams.append((small_blob(outline="l"), other.quiet(103, 8), other.frames(102, 2)))
-    steps: list[Step] = [Load(small_blob()), TareStep(quiet), Play(frames)]
+    streams.append((small_blob(outline="l"), other.untouched(103, 8), other.frames(102, 2)))
+    steps: list[Step] = [Load(small_blob()), TareStep(untouched), Play(frames)]
     fresh: list[Step] = []
-    for blob, quiet_v, frames_v in streams:
-        steps += [Load(blob), Play(frames_v[:1]), TareStep(quiet_v), Play(frames_v)]
-        fresh += [Load(blob), TareStep(quiet_v), Play(frames_v)]
+    for blob, untouched_v, frames_v in streams:
+        steps += [Load(blob), Play(frames_v[:1]), TareStep(untouched_v), Play(frames_v)]
+        fresh += [Load(blob), TareStep(untouched_v), Play(frames_v)]
     _, streamed = same_everywhere.steps(steps)
     _, alone = same_everywhere.steps(fresh)
     after = streamed[2:]
@@ -79,16 +79,16 @@ def test_options_changed(same_everywhere, margins):
     """Cold starts: each frame is as in a context that never had other options. Warm ones: a sign,
     once changed, leaves nothing that it forbids."""
     s, blob, within = small(), small_blob(), margins.of("time/options-changed")
-    quiet, frames = s.quiet(111, 8), s.frames(110, 2)
-    stream: list[Step] = [Load(blob), TareStep(quiet)]
+    untouched, frames = s.untouched(111, 8), s.frames(110, 2)
+    stream: list[Step] = [Load(blob), TareStep(untouched)]
     alone: list[Step] = []
     for options in changes():
         stream += [Choose(options), Play(frames)]
-        alone += [Load(blob), TareStep(quiet), Choose(options), Play(frames)]
+        alone += [Load(blob), TareStep(untouched), Choose(options), Play(frames)]
     _, streamed = same_everywhere.steps(stream)
     _, fresh = same_everywhere.steps(alone)
     within("cold frames unlike those of a fresh context", unlike(streamed, fresh), 0, "frames")
-    warm: list[Step] = [Load(blob), TareStep(quiet)]
+    warm: list[Step] = [Load(blob), TareStep(untouched)]
     usual, signs = replace(default_options(small_model()), warm_start=True), [*SIGNS, *SIGNS]
     for sign, solver in product(signs, SOLVERS):
         warm += [Choose(replace(usual, sign=sign, solver=solver)), Play(frames)]
@@ -108,19 +108,19 @@ def test_tare_in_midstream(same_everywhere, margins):
     """
     s, blob = small(), small_blob()
     options = replace(default_options(small_model()), warm_start=True)
-    quiet, drifted, frames = s.quiet(121, 8), 1.1 * s.quiet(122, 8), s.frames(120, 3)
-    held = frames[:1] + s.quiet(123, 8) - s.linear.v0_v
-    broken = quiet.copy()
+    untouched, drifted, frames = s.untouched(121, 8), 1.1 * s.untouched(122, 8), s.frames(120, 3)
+    held = frames[:1] + s.untouched(123, 8) - s.linear.v0_v
+    broken = untouched.copy()
     broken[5, 7] = np.nan
     head: list[Step] = [Load(blob), Choose(options)]
     played = [
         [TareStep(drifted), Play(1.1 * frames)],
         [TareStep(held), Play(frames)],
-        [TareStep(quiet), Play(frames)],
+        [TareStep(untouched), Play(frames)],
     ]
     statuses, outcomes = same_everywhere.steps(
         [*head, *played[2], *played[0], *played[1], TareStep(broken), Play(frames[:1]),
-         TareStep(quiet), Forget(), Play(frames)]
+         TareStep(untouched), Forget(), Play(frames)]
     )  # fmt: skip
     _, alone = same_everywhere.steps([step for one in played for step in (*head, *one)])
     assert [status == 0 for status in statuses] == [True] * 5 + [False, True]

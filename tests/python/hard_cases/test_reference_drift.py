@@ -63,8 +63,8 @@ def test_touch_during_tare(same_everywhere, margins):
     said."""
     lifts = []
     for k in range(COUNT):
-        quiet = noisy(k, np.tile(simulated()[k]["touched"], (16, 1)), 0)
-        lifts.append((quiet, np.array([touched(k), noisy(k, simulated()[k]["quiet"], 1)])))
+        untouched = noisy(k, np.tile(simulated()[k]["touched"], (16, 1)), 0)
+        lifts.append((untouched, np.array([touched(k), noisy(k, simulated()[k]["quiet"], 1)])))
     missed = 0
     for held, lifted in run(same_everywhere, lifts, options()):
         assert held.info.diagnostics == 0 and held.touches == ()

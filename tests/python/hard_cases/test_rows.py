@@ -25,10 +25,10 @@ def options(**changes: object) -> Options:
 def run(
     same_everywhere: SameEverywhere, pairs: list[tuple[np.ndarray, np.ndarray]], chosen: Options
 ) -> list[list[Outcome]]:
-    """Outcomes of frames after a tare on quiet frames, pair by pair; all finite."""
+    """Outcomes of frames after a tare on untouched frames, pair by pair; all finite."""
     steps: list[Step] = [Load(prebuilt()[1]), Choose(chosen)]
-    for quiet, frames in pairs:
-        steps += [TareStep(quiet), Play(frames)]
+    for untouched, frames in pairs:
+        steps += [TareStep(untouched), Play(frames)]
     statuses, outcomes = same_everywhere.steps(steps)
     assert set(statuses) == {0}
     assert all(one.finite() for one in outcomes)
@@ -39,7 +39,7 @@ def run(
 def in_scene_0(
     same_everywhere: SameEverywhere, frames: list[np.ndarray] | np.ndarray, **changes: object
 ) -> list[Outcome]:
-    """Of frames after a tare on its quiet frames."""
+    """Of frames after a tare on its untouched frames."""
     (found,) = run(same_everywhere, [(quiet_frames(0), np.array(frames))], options(**changes))
     return found
 
@@ -79,8 +79,8 @@ def test_outlier_in_half_scans(same_everywhere, margins):
     half of what it would be."""
     found, blind = [], []
     scans = [
-        (half(quiet), half(frames))
-        for quiet, frames in played(lambda k: [touched(k), damaged(k, 1.0)])
+        (half(untouched), half(frames))
+        for untouched, frames in played(lambda k: [touched(k), damaged(k, 1.0)])
     ]
     for chosen, losses in ((options(), found), (options(diagnostics=0), blind)):
         for k, (clean, spoilt) in enumerate(run(same_everywhere, scans, chosen)):
@@ -90,13 +90,13 @@ def test_outlier_in_half_scans(same_everywhere, margins):
 
 
 def test_outlier_in_the_reference(same_everywhere, margins):
-    """One reading of one of 16 quiet frames off by rms(V0) / 2: left out of the reference and of
-    its noise."""
+    """One reading of one of 16 untouched frames off by rms(V0) / 2: left out of the reference and
+    of its noise."""
     pairs, within = [], margins.of("frames/outlier-while-taring")
     for k in range(COUNT):
-        quiet, frames = quiet_frames(k), touched(k)[None]
-        quiet[(3 * k) % len(quiet), 17 * k + 5] += 0.5 * rms_v(k)
-        pairs += [(quiet_frames(k), frames), (quiet, frames)]
+        untouched, frames = quiet_frames(k), touched(k)[None]
+        untouched[(3 * k) % len(untouched), 17 * k + 5] += 0.5 * rms_v(k)
+        pairs += [(quiet_frames(k), frames), (untouched, frames)]
     results = run(same_everywhere, pairs, options())
     for k, ((clean,), (spoilt,)) in enumerate(zip(results[::2], results[1::2], strict=True)):
         off = abs(spoilt.info.lambda_noise - clean.info.lambda_noise) / clean.info.lambda_noise
@@ -155,10 +155,14 @@ def test_saturation_in_touch(same_everywhere, margins):
 
 
 def test_saturation_in_the_reference(same_everywhere):
-    """A saturated quiet frame is no reference, whether the touch saturates too or not; the same
+    """A saturated untouched frame is no reference, whether the touch saturates too or not; the same
     status everywhere."""
-    quiet, limit = quiet_frames(0), float(np.abs(quiet_frames(0)).max())
-    steps: list[Step] = [Load(prebuilt()[1]), Choose(options(saturation_v=limit)), TareStep(quiet)]
+    untouched, limit = quiet_frames(0), float(np.abs(quiet_frames(0)).max())
+    steps: list[Step] = [
+        Load(prebuilt()[1]),
+        Choose(options(saturation_v=limit)),
+        TareStep(untouched),
+    ]
     assert same_everywhere.steps(steps)[0] == [0, 0, CHANNELS]
 
 

@@ -58,14 +58,15 @@ def test_powers_of_two_and_turned_signs(same_everywhere, margins, solver):
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_polarity(same_everywhere, margins, data_kind):
-    """Wires swapped at current or voltage turn every sign, in quiet frames too: the same bits."""
+    """Wires swapped at current or voltage turn every sign, in untouched frames too: the same
+    bits."""
     s, blob = small(), small_blob("f32", data_kind)
     options = default_options(small_model("f32", data_kind))
-    quiet, frames = s.quiet(61, 8), s.frames(60, 3)
+    untouched, frames = s.untouched(61, 8), s.frames(60, 3)
     steps = [
         step
         for turn in (1, -1)
-        for step in (Load(blob), Choose(options), TareStep(turn * quiet), Play(turn * frames))
+        for step in (Load(blob), Choose(options), TareStep(turn * untouched), Play(turn * frames))
     ]
     _, outcomes = same_everywhere.steps(steps)
     for one, other in zip(outcomes[:3], outcomes[3:], strict=True):
@@ -80,14 +81,16 @@ def model_of(
     return make_model(skin, protocol, linear, BuildSettings(rank=RANK, data_kind=data_kind))
 
 
-def steps_for(model: Model, options: Options, quiet: np.ndarray, frames: np.ndarray) -> list[Step]:
-    return [Load(encode_model(model)), Choose(options), TareStep(quiet), Play(frames)]
+def steps_for(
+    model: Model, options: Options, untouched: np.ndarray, frames: np.ndarray
+) -> list[Step]:
+    return [Load(encode_model(model)), Choose(options), TareStep(untouched), Play(frames)]
 
 
-def data_of(model: Model, options: Options, quiet: np.ndarray, frame: np.ndarray) -> np.ndarray:
+def data_of(model: Model, options: Options, untouched: np.ndarray, frame: np.ndarray) -> np.ndarray:
     """y (r,) as the solver sees it."""
     host = Host(encode_model(model))
-    found = [host.status_of(step) for step in (Choose(options), TareStep(as_float32(quiet)))]
+    found = [host.status_of(step) for step in (Choose(options), TareStep(as_float32(untouched)))]
     assert found == [0, 0]
     host.solve_frame(as_float32(frame))
     return host.reduced_data()[: model.rank].astype(np.float64)
@@ -113,7 +116,9 @@ def check_alike(
     )  # fmt: skip
     both = zip(models, frames, strict=True)
     steps = [
-        step for model, (quiet, given) in both for step in steps_for(model, options, quiet, given)
+        step
+        for model, (untouched, given) in both
+        for step in steps_for(model, options, untouched, given)
     ]
     _, outcomes = same_everywhere.steps(steps)
     count = len(frames[0][1])
@@ -121,8 +126,8 @@ def check_alike(
     for k in range(count):
         one, other = outcomes[k], outcomes[count + k]
         points = [
-            judged(m.sensitivity, data_of(m, options, quiet, given[k]), "increase", o)
-            for m, (quiet, given), o in zip(models, frames, (one, other), strict=True)
+            judged(m.sensitivity, data_of(m, options, untouched, given[k]), "increase", o)
+            for m, (untouched, given), o in zip(models, frames, (one, other), strict=True)
         ]
         size = float(np.linalg.norm(points[0].y))
         norm = float(np.linalg.norm(models[0].projection.astype(np.float64), 2))
@@ -148,7 +153,7 @@ def test_electrodes_relabelled(same_everywhere, margins, what):
     linear = linearise(skin, protocol, pixels_across=PIXELS, elements=ELEMENTS)
     assert np.abs(linear.v0_v - s.linear.v0_v).max() < 1e-9 * np.abs(s.linear.v0_v).max()
     models = model_of(s.skin, s.protocol, s.linear), model_of(skin, protocol, linear)
-    given = s.quiet(71, 8), s.frames(70, 2)
+    given = s.untouched(71, 8), s.frames(70, 2)
     same = np.arange(models[0].grid.n_pixels)
     check_alike(same_everywhere, margins, what, models, (given, given), same)
 
@@ -159,8 +164,8 @@ def test_channels_permuted_with_the_protocol(same_everywhere, margins):
     protocol = table(COUNT, s.protocol.drive_measure[order].astype(int))
     linear = replace(s.linear, jacobian=s.linear.jacobian[order], v0_v=s.linear.v0_v[order])
     models = model_of(s.skin, s.protocol, s.linear), model_of(s.skin, protocol, linear)
-    quiet, frames = s.quiet(73, 8), s.frames(72, 2)
-    given = (quiet, frames), (quiet[:, order], frames[:, order])
+    untouched, frames = s.untouched(73, 8), s.frames(72, 2)
+    given = (untouched, frames), (untouched[:, order], frames[:, order])
     same = np.arange(models[0].grid.n_pixels)
     check_alike(same_everywhere, margins, "channels permuted", models, given, same)
 
@@ -225,8 +230,8 @@ def test_the_disk_turned_and_mirrored(same_everywhere, margins, what):
     again[np.ix_(to, pixel)] = sign[:, None] * linear.jacobian
     assert np.abs(again - linear.jacobian).max() < 1e-12 * np.abs(linear.jacobian).max()
     clean = replace(s, linear=linear)
-    quiet, frames = clean.quiet(75, 8), clean.frames(74, 2)
-    moved_quiet, moved_frames = np.empty_like(quiet), np.empty_like(frames)
-    moved_quiet[:, to], moved_frames[:, to] = sign * quiet, sign * frames
-    given = (quiet, frames), (moved_quiet, moved_frames)
+    untouched, frames = clean.untouched(75, 8), clean.frames(74, 2)
+    moved_untouched, moved_frames = np.empty_like(untouched), np.empty_like(frames)
+    moved_untouched[:, to], moved_frames[:, to] = sign * untouched, sign * frames
+    given = (untouched, frames), (moved_untouched, moved_frames)
     check_alike(same_everywhere, margins, what, (model, model), given, pixel)

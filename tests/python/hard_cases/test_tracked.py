@@ -24,7 +24,7 @@ def frames_of(places_mm: list[tuple[float, float] | None], share: float, seed: i
     """A disc of 9 mm at each place, or none, that changes the sheet by ``share`` of itself; with
     noise."""
     s = small()
-    frames = s.quiet(seed, len(places_mm), NOISE)
+    frames = s.untouched(seed, len(places_mm), NOISE)
     for frame, place in zip(frames, places_mm, strict=True):
         if place is not None:
             inside = np.linalg.norm(s.linear.grid.centres_mm() - place, axis=1) <= 9
@@ -33,27 +33,27 @@ def frames_of(places_mm: list[tuple[float, float] | None], share: float, seed: i
 
 
 def head(chosen: Options) -> list[Step]:
-    return [Load(small_blob()), Choose(chosen), TareStep(small().quiet(131, 32, NOISE))]
+    return [Load(small_blob()), Choose(chosen), TareStep(small().untouched(131, 32, NOISE))]
 
 
 def test_noise_that_flickers(same_everywhere, margins):
-    """Quiet frames at half of the gate: without tracking many of them have a touch, and each that
-    comes is another; with it a touch has to come twice to one place."""
+    """Untouched frames at half of the gate: without tracking many of them have a touch, and each
+    that comes is another; with it a touch has to come twice to one place."""
     low = options(detection_factor=0.6)
-    quiet = frames_of([None] * 40, 0, 132)
+    untouched = frames_of([None] * 40, 0, 132)
     off = replace(low, track_confirm=0, track_hold=0, track_smooth=0.0)
     untracked, tracked = (
-        sum(len(one.touches) for one in same_everywhere.steps([*head(each), Play(quiet)])[1])
+        sum(len(one.touches) for one in same_everywhere.steps([*head(each), Play(untouched)])[1])
         for each in (off, low)
     )
     assert untracked >= 10
-    what = "touches reported in 40 quiet frames"
+    what = "touches reported in 40 untouched frames"
     margins.everywhere(FLICKER, what, tracked, untracked / 5, "touches")
 
 
 def test_a_finger_that_lifts(same_everywhere, margins):
-    """A clear touch that is lifted is told no more from the next frame on, and one that comes at
-    its place later is another."""
+    """A clear touch that is lifted is no longer reported from the next frame on, and one that comes
+    at its place later is another."""
     place = (10.0, 15.0)
     path = [place] * 8 + [None] * 5 + [place] * 3 + [None] + [place] * 2
     _, outcomes = same_everywhere.steps([*head(options()), Play(frames_of(path, 1.0, 133))])

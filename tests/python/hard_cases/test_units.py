@@ -98,38 +98,38 @@ def test_units_of_model_and_data(same_everywhere, margins, solver):
 
 
 def reduced(
-    model: Model, blob: bytes, options: Options, quiet: np.ndarray, frame: np.ndarray
+    model: Model, blob: bytes, options: Options, untouched: np.ndarray, frame: np.ndarray
 ) -> np.ndarray:
     """y (r,) as the solver sees it."""
     engine = CoreEngine(blob)
     engine.set_options(options)
-    engine.set_reference(as_float32(quiet).astype(np.float64))
+    engine.set_reference(as_float32(untouched).astype(np.float64))
     engine.solve_frame(as_float32(frame))
     return engine.reduced_data()[: model.rank].astype(np.float64)
 
 
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_units_of_frames(same_everywhere, margins, data_kind):
-    """Frames and quiet frames in other volts: the gain brings them to the model's, from 1e-38 to
-    1e37. Every voltage is rounded again, by u of itself, and so is every mean of 8 quiet ones, 8
-    times; their difference, times the gain, is so off by at most (1 + 8 + 3) u of the model's own
-    voltage a row, and y by |P| times the norm of that; as a ratio by as much of 1. Denormal
-    voltages of 1e-38 have 2^-149 / 1e-38 = 2^-23 in place of u."""
+    """Frames and untouched frames in other volts: the gain brings them to the model's, from 1e-38
+    to 1e37. Every voltage is rounded again, by u of itself, and so is every mean of 8 untouched
+    ones, 8 times; their difference, times the gain, is so off by at most (1 + 8 + 3) u of the
+    model's own voltage a row, and y by |P| times the norm of that; as a ratio by as much of 1.
+    Denormal voltages of 1e-38 have 2^-149 / 1e-38 = 2^-23 in place of u."""
     s, model, blob = small(), small_model("f32", data_kind), small_blob("f32", data_kind)
-    quiet, frames = s.quiet(31, 8), s.frames(30, 2)
+    untouched, frames = s.untouched(31, 8), s.frames(30, 2)
     options = replace(default_options(model), solver="active-set", iterations=1000, gap_rel=1e-5)
     exponents = [0, -38, -37, *EXPONENTS, 37]
     steps: list[Step] = []
     for e in exponents:
         steps += [Load(blob), Choose(options)]
-        steps += [TareStep(as_float32(quiet * 10.0**e)), Play(as_float32(frames * 10.0**e))]
+        steps += [TareStep(as_float32(untouched * 10.0**e)), Play(as_float32(frames * 10.0**e))]
     statuses, outcomes = same_everywhere.steps(steps)
     assert set(statuses) == {0}
     per_row = np.ones(len(model.v_ref_v)) if data_kind == "normalised" else np.abs(model.v_ref_v)
     norm = float(np.linalg.norm(model.projection.astype(np.float64), 2))
     data_off = 12 * U * norm * float(np.linalg.norm(per_row))
     points = [
-        [reduced(model, blob, options, quiet * 10.0**e, frame * 10.0**e) for frame in frames]
+        [reduced(model, blob, options, untouched * 10.0**e, frame * 10.0**e) for frame in frames]
         for e in exponents
     ]
     what = f"y, frames in other volts, {data_kind}"
@@ -152,14 +152,14 @@ def test_units_of_frames(same_everywhere, margins, data_kind):
 def test_the_noise_has_the_units_of_the_frames(margins, width):
     """rms over rows of the deviation: a square of volts would leave float32 at 1e-23 and 1e19."""
     s = small()
-    quiet = s.quiet(31, 8)
-    truth = float(np.sqrt(quiet.var(axis=0, ddof=1).mean()))
+    untouched = s.untouched(31, 8)
+    truth = float(np.sqrt(untouched.var(axis=0, ddof=1).mean()))
     for e in EXPONENTS:
         engine = CoreEngine(small_blob(), width)
-        baseline = engine.set_reference(quiet * 10.0**e)
+        baseline = engine.set_reference(untouched * 10.0**e)
         off = abs(baseline.noise_v / (truth * 10.0**e) - 1)
         target = "host f32" if width == "float32" else "host f64"
-        # a quiet voltage is rounded by u |v0|, 1e3 u of a deviation of 1e-3 |v0|; at worst
+        # an untouched voltage is rounded by u |v0|, 1e3 u of a deviation of 1e-3 |v0|; at worst
         # 8 frames' errors add up
         margins.record(
             FRAMES_CASE, "noise learned, frames in other volts", target, off, 8 * 1e3 * U, "of it"

@@ -19,7 +19,7 @@ INSULATING = (0.9, 0.5, 0.1, 0.001)
 PRESSES = (1.002, 1.005, 1.01, 1.02, 1.05, 1.1, 1.2, 1.5)
 APART_MM = (80.0, 60.0, 40.0, 30.0, 24.0, 18.0, 24.0, 30.0, 40.0, 60.0, 80.0)
 PRESS_PLACES = 8
-QUIET_TRIALS = 200
+UNTOUCHED_TRIALS = 200
 
 
 def ring(count: int, ring_mm: float, radius_mm: float, turn: float = 0.0) -> tuple[TrueTouch, ...]:
@@ -83,7 +83,7 @@ def groups() -> dict[str, list[tuple[TrueTouch, ...]]]:
 
 @cache
 def simulated() -> Simulated:
-    """All scenes at 60 dB and 12 bits, 64 quiet frames."""
+    """All scenes at 60 dB and 12 bits, 64 untouched frames."""
     scenes = tuple(
         TouchScene(f"{name} {k}", touches)
         for name, each in groups().items()
@@ -106,12 +106,12 @@ def frames_of(name: str) -> np.ndarray:
 
 
 @cache
-def quiet_trials() -> np.ndarray:
+def untouched_trials() -> np.ndarray:
     """Frames of the untouched skin (k, m) V, of which none was in the reference."""
     nothing = TouchSet("quiet trials", 2, (TouchScene("nothing", ()),))
     one = simulate(
         paper_skin(), adjacent(16), nothing, seed=1, mesh=mesh_for_elements(paper_skin(), ELEMENTS),
-        measurement=Measurement(quiet_frames=QUIET_TRIALS, contact_spread=0.0),
+        measurement=Measurement(quiet_frames=UNTOUCHED_TRIALS, contact_spread=0.0),
     )  # fmt: skip
     own = simulated()
-    return np.asarray(one.quiet_v - one.exact_quiet_v + own.exact_quiet_v)
+    return np.asarray(one.untouched_v - one.exact_untouched_v + own.exact_untouched_v)

@@ -312,11 +312,11 @@ def test_another_core_than_the_one_that_wrote_the_checksums_is_told():
     blob = encode_tested(small_model())
     sums = CoreEngine(blob).self_test_sums()
     assert blob.count(sums) == 1 and blob[6] == 7
-    for place, told in ((0, False), (4, True), (len(sums) - 1, True)):  # revision; first, last
+    for place, reported in ((0, False), (4, True), (len(sums) - 1, True)):  # revision; first, last
         changed = bytearray(sums)
         changed[place] ^= 1
         engine = CoreEngine(encode_model(small_model(), bytes(changed)))
-        if told:
+        if reported:
             with pytest.raises(FrameError, match="other bits"):
                 engine.self_test()
         else:

@@ -216,7 +216,7 @@ def test_the_tare_tells_shifted_electrodes_from_an_uneven_sheet(data_kind):
     assert places.dtype == np.float32 and places.shape == (16, len(skins.v_ref))
     apart = {}
     for shifted in (True, False):
-        told = []
+        reported = []
         for _ in range(6):
             mesh = asked.mesh
             if shifted:
@@ -228,8 +228,8 @@ def test_the_tare_tells_shifted_electrodes_from_an_uneven_sheet(data_kind):
                 ForwardModel(mesh, SKIN, asked.protocol).voltages(0.02 * np.exp(field)), asked.fold
             )
             y = np.log(v / np.linalg.norm(v) / (skins.v_ref / np.linalg.norm(skins.v_ref)))
-            told.append(float(((places @ y) ** 2).sum() / np.mean(y**2)))
-        apart[shifted] = np.median(told)
+            reported.append(float(((places @ y) ** 2).sum() / np.mean(y**2)))
+        apart[shifted] = np.median(reported)
     assert apart[True] > 2 * apart[False]
 
 

@@ -41,10 +41,10 @@ def said(engine: object, frame: FloatArray) -> tuple[object, ...]:
 
 
 @cache
-def tared(quiet: int = 64, **options: object) -> AllEngines:
+def tared(untouched: int = 64, **options: object) -> AllEngines:
     made = AllEngines(*prebuilt(), engines=("c", "c64", "numpy"))
     made.set_options(**options)
-    made.tare(session().quiet_v[:quiet].astype(np.float32).astype(float))
+    made.tare(session().untouched_v[:untouched].astype(np.float32).astype(float))
     return made
 
 
@@ -117,14 +117,14 @@ ONE: dict[str, tuple[Spoil, str]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("quiet", [1, 64], ids=["noise unknown", "noise known"])
+@pytest.mark.parametrize("untouched", [1, 64], ids=["noise unknown", "noise known"])
 @pytest.mark.parametrize("name", ONE)
-def test_scenes_of_one_fault(name, quiet):
+def test_scenes_of_one_fault(name, untouched):
     spoil, expected = ONE[name]
     for frame in session().frames_v[:3].copy():
         spoil(frame)
-        found = alike(tared(quiet), frame)
-        if expected and quiet > 1:
+        found = alike(tared(untouched), frame)
+        if expected and untouched > 1:
             assert expected in str(found) or "too many" in str(found)
 
 
@@ -161,11 +161,11 @@ def test_half_scans_have_no_reciprocals_of_their_own():
     """Copied reciprocals are one measurement: an outlier is found by prediction alone, and the
     noise of a fold is that of one row."""
     model, fold = prebuilt()[0], prebuilt()[0].fold
-    quiet, frames = session().quiet_v.copy(), session().frames_v[:4].copy()
-    for some in (quiet, frames):
+    untouched, frames = session().untouched_v.copy(), session().frames_v[:4].copy()
+    for some in (untouched, frames):
         some[:, fold.second] = fold.sign * some[:, fold.first]
     made = AllEngines(*prebuilt(), engines=("c64", "numpy"))
-    made.tare(quiet)
+    made.tare(untouched)
     named = 0
     for k, frame in enumerate(frames):
         row = 5 * k + 3
@@ -181,7 +181,7 @@ def test_the_prediction_is_a_fit_without_the_predicted_folds():
     """By refitting, not by the formula for leaving out: C's choice of side follows it above."""
     model = prebuilt()[0]
     oracle = OracleEngine(model)
-    oracle.set_reference(session().quiet_v)
+    oracle.set_reference(session().untouched_v)
     ref = oracle.reference
     assert ref is not None
     frame, nothing = session().frames_v[0], np.zeros(208, dtype=bool)
@@ -201,11 +201,11 @@ def test_model_mismatch_is_what_lies_outside(snr_db, copied):
     """To 5e-4 of |d|: C takes U as orthogonal, which it is to float32's rounding. Copies of rows
     are no second measurement: their noise is that of one."""
     scenes, fold = session(snr_db=snr_db), prebuilt()[0].fold
-    quiet, frames = scenes.quiet_v.copy(), scenes.frames_v[:6].copy()
-    for some in (quiet, frames) if copied else ():
+    untouched, frames = scenes.untouched_v.copy(), scenes.frames_v[:6].copy()
+    for some in (untouched, frames) if copied else ():
         some[:, fold.second] = fold.sign * some[:, fold.first]
     made = AllEngines(*prebuilt(), engines=("c", "c64", "numpy"))
-    made.tare(quiet)
+    made.tare(untouched)
     for k, frame in enumerate(frames):
         moved = frame * (1 + 0.004 * k * np.sin(np.arange(208) / 9))
         results = made.reconstruct(moved, touches=False)
@@ -219,7 +219,7 @@ def test_model_mismatch_is_what_lies_outside(snr_db, copied):
 def test_stale_references(sign, times_change):
     """A change the other way than touches go; never with both signs."""
     made = tared(64)
-    mean = session().quiet_v.mean(axis=0)
+    mean = session().untouched_v.mean(axis=0)
     made.set_options(sign=sign)
     names = alike(made, mean + times_change * (session().frames_v[2] - mean))[3]
     made.set_options(sign="increase")
@@ -239,7 +239,7 @@ def test_crowded_is_the_score_of_what_the_core_found():
             how = Measurement(snr_db=snr_db)
             scenes = simulate(paper_skin(), adjacent(16), touches, measurement=how)
             made = AllEngines(*prebuilt(), engines=("c64",), touch_test=0)
-            made.tare(scenes.quiet_v)
+            made.tare(scenes.untouched_v)
             for frame in scenes.frames_v:
                 made.forget()
                 result, o = made.reconstruct(frame)["c64"], made["c64"].options
@@ -261,11 +261,11 @@ def test_crowded_is_the_score_of_what_the_core_found():
 def test_outliers_of_the_reference(count, at, rows, factor, copied):
     """Any readings wrong in one frame of some; also where reciprocals are copies."""
     s, fold = small(), small().protocol.reciprocal_pairs()
-    quiet = s.quiet(count, count).astype(np.float32).astype(float)
-    quiet[at % count, rows] *= factor
+    untouched = s.untouched(count, count).astype(np.float32).astype(float)
+    untouched[at % count, rows] *= factor
     if copied:
-        quiet[:, fold.second] = fold.sign * quiet[:, fold.first]
-    learned = AllEngines(small_model(), engines=("c64", "numpy")).tare(quiet)
+        untouched[:, fold.second] = fold.sign * untouched[:, fold.first]
+    learned = AllEngines(small_model(), engines=("c64", "numpy")).tare(untouched)
     assert learned["c64"].outliers == learned["numpy"].outliers
     # a fold that is left out of one frame brings the estimate of test_images' noise ratio in
     for name, bound in (("gain", 1e-6), ("noise_v", 1e-6), ("lambda_noise", 0.15)):
@@ -277,9 +277,9 @@ def test_outliers_of_the_reference_change_nothing_else():
     """One reading in one of eight frames: found, and the reference is nearly that without it."""
     s, learned = small(), []
     for factor in (1.0, 1.5):
-        quiet = s.quiet(5, 8)
-        quiet[3, 40] *= factor
+        untouched = s.untouched(5, 8)
+        untouched[3, 40] *= factor
         oracle = OracleEngine(small_model())
-        learned.append(oracle.set_reference(quiet))
+        learned.append(oracle.set_reference(untouched))
     assert [one.outliers for one in learned] == [0, 1]
     assert learned[1].noise_v == pytest.approx(learned[0].noise_v, rel=0.05)

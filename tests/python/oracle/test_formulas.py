@@ -85,13 +85,13 @@ def test_rows_left_out_are_whitened_as_the_builder_does(pairs):
 def test_a_noisy_reference_gets_the_model_of_a_higher_floor(noise):
     """The same S'S, S'y and optimum, but for a scale, as from a model that was built with that
     regularisation."""
-    s, frame, quiet = small(), small().frames(4, 1)[0], small().quiet(6, 8, noise=noise)
+    s, frame, untouched = small(), small().frames(4, 1)[0], small().untouched(6, 8, noise=noise)
     engine = oracle(small_model(), diagnostics=0)
-    learned = engine.set_reference(quiet)
+    learned = engine.set_reference(untouched)
     mu = min(5 * learned.noise_v / learned.v0_rms_v, 1.0)
     built = BuildSettings(rank=37, regularisation=mu)
     other = oracle(make_model(s.skin, s.protocol, s.linear, built), diagnostics=0)
-    other.set_reference(quiet)
+    other.set_reference(untouched)
     a, b, scale = engine.explain(frame), other.explain(frame), (1 + mu) / 1.01
     assert a.whitening.regularisation == pytest.approx(mu)
     assert a.s.T @ a.s == pytest.approx(scale * b.s.T @ b.s, abs=1e-5)
@@ -130,18 +130,18 @@ def test_one_row_of_a_pair_stands_for_both():
 
 def test_lambda_noise_is_the_greatest_of_the_second_half():
     s, model = small(), small_model()
-    quiet, engine, seen = s.quiet(5, 10), OracleEngine(small_model()), []
-    learned = engine.set_reference(quiet)
+    untouched, engine, seen = s.untouched(5, 10), OracleEngine(small_model()), []
+    learned = engine.set_reference(untouched)
     first = OracleEngine(model)
-    first.set_reference(quiet[:5].mean(axis=0)[None])
-    gain, project = first.reference.gain, first.explain(quiet[0]).project  # type: ignore[union-attr]
+    first.set_reference(untouched[:5].mean(axis=0)[None])
+    gain, project = first.reference.gain, first.explain(untouched[0]).project  # type: ignore[union-attr]
     for k in range(5, 10):
-        d = gain * (quiet[k] - quiet[:k].mean(axis=0))
+        d = gain * (untouched[k] - untouched[:k].mean(axis=0))
         y = project @ (model.projection @ fold_rows(d, model.fold))
         seen.append(np.abs(model.sensitivity.T @ y).max())
     assert learned.lambda_noise == pytest.approx(max(seen), rel=1e-9)
-    assert learned.noise_v == pytest.approx(quiet.std(axis=0, ddof=1).mean(), rel=0.1)
-    assert OracleEngine(model).set_reference(quiet[:3]).lambda_noise == 0
+    assert learned.noise_v == pytest.approx(untouched.std(axis=0, ddof=1).mean(), rel=0.1)
+    assert OracleEngine(model).set_reference(untouched[:3]).lambda_noise == 0
 
 
 def test_projection_takes_out_a_span():

@@ -90,7 +90,7 @@ def agree(
 def test_whole_frames(storage, data_kind, drift):
     made = AllEngines(small_model(storage, data_kind), project_reference=drift)
     for seed, sign in enumerate(SIGNS):
-        made.tare(narrow(small().quiet(1, 8) if drift else small().linear.v0_v))
+        made.tare(narrow(small().untouched(1, 8) if drift else small().linear.v0_v))
         agree(made, narrow(small().frames(5 + seed, FRAMES // 3, sign)), EXACT, sign)
 
 
@@ -106,7 +106,7 @@ def test_one_row_of_a_pair_stands_for_both(storage, data_kind):
     for k, frame in enumerate(frames):
         frame[fold.second[[k, 2 * k + 1]][~mask[fold.first[[k, 2 * k + 1]]]]] = np.nan
     made.mask_rows(mask)
-    made.tare(narrow(small().quiet(1, 8)))
+    made.tare(narrow(small().untouched(1, 8)))
     agree(made, frames, EXACT, "increase")
 
 
@@ -128,7 +128,7 @@ def test_reciprocals_that_are_measured_the_other_way_round(data_kind):
     s, model = turned(data_kind)
     assert (model.fold.sign < 0).any() and (model.fold.sign > 0).any()
     made = AllEngines(model, diagnostics=0)
-    made.tare(narrow(s.quiet(1, 8)))
+    made.tare(narrow(s.untouched(1, 8)))
     frames = narrow(s.frames(5, 3))
     frames[1, model.fold.first[::2]] = np.nan
     frames[2, model.fold.second[1::2]] = np.nan
@@ -143,7 +143,7 @@ def test_rows_left_out_are_whitened_as_if_they_had_never_been_there(storage, dat
     """A pair, then one, two, three electrodes."""
     fold = small().protocol.reciprocal_pairs()
     made = AllEngines(small_model(storage, data_kind), max_masked=208)
-    made.tare(narrow(small().quiet(1, 8)))
+    made.tare(narrow(small().untouched(1, 8)))
     frames = narrow(small().frames(15, 4))
     frames[0, [fold.first[10], fold.second[10]]] = np.nan
     for k in (1, 2, 3):
@@ -156,7 +156,7 @@ def test_rows_left_out_are_whitened_as_if_they_had_never_been_there(storage, dat
 def test_a_noisy_tare_raises_the_regularisation(storage, data_kind):
     """Tenfold, and another with an electrode out."""
     made = AllEngines(small_model(storage, data_kind), diagnostics=0)
-    made.tare(narrow(small().quiet(1, 8, noise=0.02)))
+    made.tare(narrow(small().untouched(1, 8, noise=0.02)))
     frames = narrow(small().frames(5, 4, noise=0.02))
     agree(made, frames, STORED, "increase")
     agree(made, np.array([without([3], frames[3])]), WHITENED, "increase")
@@ -193,7 +193,7 @@ def row_factors(log_sd: float) -> np.ndarray:
 def test_row_gains(name: str, spoil: Callable[[np.ndarray], np.ndarray], row_gains):
     """They are in force where the skin differs, and not where the instrument does."""
     made = AllEngines(*prebuilt(), row_gains=row_gains)
-    made.tare(narrow(spoil(session().quiet_v)))
+    made.tare(narrow(spoil(session().untouched_v)))
     frames = narrow(spoil(session().frames_v[:3]))
     agree(made, frames, STORED, "increase")
     for result in made.reconstruct(frames[0], touches=False).values():
@@ -207,7 +207,7 @@ def test_row_gains(name: str, spoil: Callable[[np.ndarray], np.ndarray], row_gai
 @pytest.mark.parametrize("count", [1, 3, 4, 5, 21])
 def test_what_is_learned_of_a_reference(data_kind, count):
     made = AllEngines(small_model("f16", data_kind))
-    learned = made.tare(narrow(small().quiet(3, count)))
+    learned = made.tare(narrow(small().untouched(3, count)))
     for name, bound in (("c64", 1e-7), ("c", 1e-3)):
         for field in ("correlation", "gain", "v0_rms_v", "noise_v", "lambda_noise"):
             expected = getattr(learned["numpy"], field)
@@ -222,7 +222,7 @@ def test_noise_of_rows_left_out(data_kind):
     kind, that is within 15 % of the definition, and within 6 % in three of four."""
     made, ratios = AllEngines(small_model("f32", data_kind), engines=("c64", "numpy")), []
     made.set_options(max_masked=208)
-    made.tare(small().quiet(1, 8))
+    made.tare(small().untouched(1, 8))
     frame = small().frames(4, 1)[0]
     for count in (1, 2, 3):
         for first in range(0, 16, 3):
@@ -238,7 +238,7 @@ def test_a_touch_must_stand_out_of_the_noise_of_the_rows_in_use(lost):
     """With a factor that puts the threshold a fifth below or above lambda_max, by the definition's
     lambda_noise: within the 15 % by which C's may differ."""
     made = AllEngines(small_model(), max_masked=208, lambda_noise_factor=0.0)
-    made.tare(narrow(small().quiet(1, 8)))
+    made.tare(narrow(small().untouched(1, 8)))
     frame = without(lost, narrow(small().frames(4, 1)[0]))
     made.set_options(detection_factor=0.0)
     info = made["numpy"].reconstruct(frame, touches=False).info
@@ -251,7 +251,7 @@ def test_a_touch_must_stand_out_of_the_noise_of_the_rows_in_use(lost):
 @pytest.mark.parametrize("data_kind", DATA_KINDS)
 def test_what_is_said_of_a_frame(data_kind):
     made = AllEngines(small_model("f16", data_kind), solver="fista", detection_factor=1.2)
-    made.tare(narrow(small().quiet(3, 21)))
+    made.tare(narrow(small().untouched(3, 21)))
     made.set_options(lambda_rel=0.05)
     infos = {n: r.info for n, r in made.reconstruct(narrow(small().frames(4, 1)[0])).items()}
     expected = infos["numpy"]
@@ -274,9 +274,9 @@ def test_images_from_a_warm_start(data_kind):
         place = (-30 + 3 * k, 10) if k < 10 else (0, -35)
         near = np.linalg.norm(s.linear.grid.centres_mm() - place, axis=1) <= 9
         frames.append(s.linear.v0_v + s.linear.jacobian @ (0.03 * near * (k < 13)))
-    noisy = narrow(np.array(frames) + s.quiet(4, 16) - s.linear.v0_v)
+    noisy = narrow(np.array(frames) + s.untouched(4, 16) - s.linear.v0_v)
     noisy[7, s.protocol.reciprocal_pairs().first[:40]] = np.nan
-    made.tare(narrow(s.quiet(1, 8)))
+    made.tare(narrow(s.untouched(1, 8)))
     made.set_options(iterations=60, lambda_abs=1e30)
     top = made["numpy"].reconstruct(noisy[0], touches=False).info.lambda_max
     made.set_options(lambda_abs=0.05 * top)
@@ -325,7 +325,7 @@ def test_a_frame_does_not_depend_on_those_before(engine):
     frames[2, fold.second[20:60]] = np.nan
     frames[3, [fold.first[5], fold.second[5]]] = np.nan
     made = Reconstructor(small_model(), engine=engine)
-    made.tare(s.quiet(1, 8))
+    made.tare(s.untouched(1, 8))
     images: dict[int, np.ndarray] = {}
     for order in ((0, 1, 2, 3), (3, 2, 1, 0), (3, 1, 0, 2)):
         for k in order:
@@ -339,14 +339,14 @@ def test_a_row_masked_at_the_reference_stays_out_until_the_next(engine):
     mask = np.zeros(208, dtype=bool)
     mask[3:9] = True
     made.mask_rows(mask)
-    made.tare(s.quiet(1, 8))
+    made.tare(s.untouched(1, 8))
     frame = s.frames(6, 1)[0]
     masked = made.reconstruct(frame, touches=False)
     made.mask_rows(np.zeros(208, dtype=bool))
     still = made.reconstruct(frame, touches=False)
     assert masked.info.masked == still.info.masked == 6
     assert (masked.image == still.image).all()
-    made.tare(s.quiet(1, 8))
+    made.tare(s.untouched(1, 8))
     assert made.reconstruct(frame, touches=False).info.masked == 0
 
 
@@ -357,7 +357,7 @@ def test_the_engine_numpy_has_no_memory_and_counts_no_work():
     plain, tracked = (Reconstructor(prebuilt()[0], engine="numpy") for _ in range(2))
     tracked.set_options(track_confirm=3, track_hold=2, track_smooth=0.7, reference_frames=2)
     for one in (plain, tracked):
-        one.tare(session().quiet_v)
+        one.tare(session().untouched_v)
     for frame in frames:
         ours, theirs = plain.reconstruct(frame), tracked.reconstruct(frame)
         assert ours.touches == theirs.touches and (ours.image == theirs.image).all()

@@ -166,7 +166,7 @@ def test_what_the_working_set_costs():
     for solver in ("fista", "working-set"):
         core = CoreEngine(blob, "float64")
         core.set_options(replace(default_options(model), solver=solver))
-        core.set_reference(session(scenes=40).quiet_v)
+        core.set_reference(session(scenes=40).untouched_v)
         frames = session(scenes=40).frames_v
         results.append([core.reconstruct(frame, touches=False) for frame in frames])
     images, above = [], []

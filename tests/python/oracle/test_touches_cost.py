@@ -29,7 +29,7 @@ def scenes(count: int, snr_db: float) -> tuple[np.ndarray, np.ndarray]:
     """Untouched frames, and five of ``count`` touches each."""
     drawn = random_touches(paper_skin().outline, 11, 5, "test", TouchRules(count=(count, count)))
     made = simulate(paper_skin(), adjacent(16), drawn, measurement=Measurement(snr_db=snr_db))
-    return made.quiet_v, made.frames_v
+    return made.untouched_v, made.frames_v
 
 
 def discs_of(fit: DiscFit, touches: tuple) -> list[Disc]:
@@ -66,13 +66,13 @@ def best_of_many(fit: DiscFit, discs: list[Disc], seed: int) -> float:
 def judged(count: int, snr_db: float) -> list[float]:
     """How much more the core's discs cost than the best found with as many, over the cost without
     any."""
-    quiet_v, frames_v = scenes(count, snr_db)
+    untouched_v, frames_v = scenes(count, snr_db)
     core = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1])
     oracle = OracleEngine(prebuilt()[0])
     core.set_options(**PLAIN)
     oracle.set_options(core.options)
-    core.tare(quiet_v)
-    oracle.set_reference(quiet_v)
+    core.tare(untouched_v)
+    oracle.set_reference(untouched_v)
     above = []
     for k, frame in enumerate(frames_v):
         core.forget()
@@ -97,14 +97,14 @@ def test_the_cores_discs_fit_the_data_less_what_they_do_to_each_other():
     """With the whole touch fit, three touches at 60 dB: the oracle takes the interaction of the
     core's discs out of the data. Then the discs cost at most 1e-4 of |y|^2 more than the best near
     them; the interaction itself is many times that."""
-    quiet_v, frames_v = scenes(3, 60.0)
+    untouched_v, frames_v = scenes(3, 60.0)
     model, options = prebuilt()[0], {"touch_test": 0, "row_gains": 0}
     core = Reconstructor(model, engine="c64", blob=prebuilt()[1])
     oracle, added, above = OracleEngine(model), [], []
     core.set_options(**options)
     oracle.set_options(core.options)
-    core.tare(quiet_v)
-    oracle.set_reference(quiet_v)
+    core.tare(untouched_v)
+    oracle.set_reference(untouched_v)
     for frame in frames_v:
         core.forget()
         seen = oracle.explain(frame)
@@ -119,10 +119,10 @@ def test_the_cores_discs_fit_the_data_less_what_they_do_to_each_other():
 
 def test_the_best_fit_is_scipys():
     """Trust region reflective on the same residuals, from the same starts: no better."""
-    quiet_v, frames_v = scenes(3, 60.0)
+    untouched_v, frames_v = scenes(3, 60.0)
     oracle = OracleEngine(prebuilt()[0])
     oracle.set_options(replace(oracle.options, **PLAIN))
-    oracle.set_reference(quiet_v)
+    oracle.set_reference(untouched_v)
     for frame in frames_v[:4]:
         seen = oracle.explain(frame)
         fit = oracle.disc_fit(seen)

@@ -85,7 +85,7 @@ def circles(imports: dict[str, set[str]]) -> list[list[str]]:
 
 def graph(package: str) -> dict[str, set[str]]:
     found = modules(package)
-    found.pop(package)  # which names lazily what is public, from every room
+    found.pop(package)  # which names lazily what is public, from every module
     imports = {name: imported(path, found) - {name} for name, path in found.items()}
     if package == "eitskin_studies":
         return imports  # a study's run imports its pictures, which import the study's package
@@ -107,7 +107,7 @@ def test_no_module_imports_itself_by_way_of_others(package):
 def test_imports_follow_the_data():
     def level(name: str) -> int:
         inner = name.removeprefix("eitskin.")
-        return next(k for k, rooms in enumerate(ORDER) if inner.partition(".")[0] in rooms)
+        return next(k for k, modules in enumerate(ORDER) if inner.partition(".")[0] in modules)
 
     against = {
         f"{name} imports {other}"

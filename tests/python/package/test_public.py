@@ -63,7 +63,7 @@ def test_frames_to_touches():
     """The page's second program."""
     model, frames = eitskin.load_model(), session().as_frames()
     assert repr(model) == "<Model paper, 16 electrodes, 208 rows, 812 pixels, rank 64>"
-    assert repr(frames) == "<Frames 20 of 208 rows, 64 quiet>"
+    assert repr(frames) == "<Frames 20 of 208 rows, 64 untouched>"
     reconstructor = eitskin.Reconstructor(model)
     reconstructor.tare(frames.reference_voltage_v)
     result = reconstructor.reconstruct(frames.voltage_v[0])

@@ -61,7 +61,7 @@ def opened(
         yield line
 
 
-def told(line: ClientConnection, kind: str) -> dict:
+def reported(line: ClientConnection, kind: str) -> dict:
     """The next message of a kind."""
     while True:
         said = line.recv(10)
@@ -97,7 +97,7 @@ def test_files_say_that_nothing_else_may_be_loaded(server):
 
 def test_a_frame_is_what_is_documented(server):
     with opened(server, TOKEN) as line:
-        setup = told(line, "setup")
+        setup = reported(line, "setup")
         assert setup["mode"] == ["raw", "image", "touches"]
         while isinstance(data := line.recv(10), str):
             pass
@@ -137,10 +137,10 @@ def test_a_model_needs_the_token_and_the_same_site(server):
 @pytest.mark.parametrize("token", [None, "", "guess", 7])
 def test_commands_need_the_token(server, token):
     with opened(server, token) as line:
-        assert told(line, "setup")["may_command"] is False
+        assert reported(line, "setup")["may_command"] is False
         for what in ("tare", "pause", "record", "sign"):
             line.send(json.dumps({"type": "do", "do": what, "value": True}))
-            answer = told(line, "answer")
+            answer = reported(line, "answer")
             assert not answer["ok"]
             assert "needs the token" in answer["text"]
     assert not server.reader.live().pacer.paused
@@ -151,7 +151,7 @@ def test_commands_need_the_token(server, token):
 )
 def test_a_page_that_talks_nonsense_is_let_go(server, said):
     with opened(server, TOKEN) as line:
-        told(line, "setup")
+        reported(line, "setup")
         line.send(said)
         with pytest.raises(ConnectionClosed):
             while True:
@@ -162,7 +162,7 @@ def test_a_page_that_talks_nonsense_is_let_go(server, said):
 def test_an_order_that_cannot_be_is_answered(server, what):
     with opened(server, TOKEN) as line:
         line.send(json.dumps({"type": "do", "do": what, "value": ["x"]}))
-        answer = told(line, "answer")
+        answer = reported(line, "answer")
         assert not answer["ok"]
 
 
@@ -182,15 +182,15 @@ def test_commands_of_a_board_that_falls_silent_are_answered_and_the_page_starts_
         for one in (page, other):
             one.send(json.dumps({"type": "do", "do": "tare"}))
         for one in (page, other):
-            answer = told(one, "answer")
+            answer = reported(one, "answer")
             assert not answer["ok"] and "has fallen silent" in answer["text"]
         until(lambda: server.reader.state == "failed")
         board.silent = False
         page.send(json.dumps({"type": "do", "do": "play"}))
-        assert told(page, "answer")["text"] == "starting again"
+        assert reported(page, "answer")["text"] == "starting again"
         until(lambda: server.reader.state == "live")
         page.send(json.dumps({"type": "do", "do": "tare"}))
-        assert told(page, "answer")["ok"]
+        assert reported(page, "answer")["ok"]
 
 
 def test_a_command_that_is_not_answered_yet_keeps_no_other_from_its_answer(server, monkeypatch):
@@ -201,10 +201,10 @@ def test_a_command_that_is_not_answered_yet_keeps_no_other_from_its_answer(serve
         for _ in range(MAX_WAITING - 1):
             line.send(json.dumps({"type": "do", "do": "tare"}))
         line.send(json.dumps({"type": "do", "do": "sign", "value": "up"}))
-        assert "cannot be" in told(line, "answer")["text"]
+        assert "cannot be" in reported(line, "answer")["text"]
         for _ in range(2):
             line.send(json.dumps({"type": "do", "do": "tare"}))
-        assert "are not answered yet" in told(line, "answer")["text"]
+        assert "are not answered yet" in reported(line, "answer")["text"]
 
 
 def test_from_elsewhere_even_looking_on_needs_the_token(scene):
@@ -215,14 +215,14 @@ def test_from_elsewhere_even_looking_on_needs_the_token(scene):
         assert end.value.rcvd is not None
         assert end.value.rcvd.code == NO_TOKEN
         with opened(server, TOKEN) as line:
-            assert told(line, "setup")["may_command"] is True
+            assert reported(line, "setup")["may_command"] is True
         assert got(server, "/", Host=f"evil.example:{server.port}")[0] == 403
 
 
 def test_a_page_that_reads_nothing_disturbs_nobody(server):
     """It says that it has drawn nothing: it gets a few frames, the rest is dropped and counted."""
     with opened(server, TOKEN) as slow, opened(server, TOKEN) as quick:
-        told(slow, "setup")
+        reported(slow, "setup")
         seen = 0
         while seen < 30:
             said = quick.recv(10)

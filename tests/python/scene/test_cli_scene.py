@@ -40,7 +40,7 @@ def test_run_writes_frames_with_truth(scene, tmp_path, capsys):
     assert frames.meta["scene"] == TEXT
     again = scene_command("run", str(scene), "-o", str(tmp_path / "f.npz"), "--truth-pixels", "0")
     assert again == 0
-    assert "short: 3 frames after 2 quiet ones" in capsys.readouterr().out
+    assert "short: 3 frames after 2 untouched ones" in capsys.readouterr().out
     assert load_frames(tmp_path / "f.npz").truth_mask is None
 
 

@@ -35,8 +35,11 @@ def test_every_library_scene_runs(name):
     compiled = compile_scene(scene, mesh_cache=BENCH)
     frames = simulate_frames(compiled).voltage_v
     assert frames.shape == (scene.n_frames, scene.protocol.n_rows)
-    quiet_v, touched_v = frames[: scene.quiet_frames], frames[scene.quiet_frames :]
-    change, noise_v = np.abs(touched_v - quiet_v.mean(axis=0)).max(), quiet_v.std(axis=0).max()
+    untouched_v, touched_v = frames[: scene.quiet_frames], frames[scene.quiet_frames :]
+    change, noise_v = (
+        np.abs(touched_v - untouched_v.mean(axis=0)).max(),
+        untouched_v.std(axis=0).max(),
+    )
     assert change > 10 * noise_v or name == "random_touches"
     assert compiled.states[0].touches == ()
 

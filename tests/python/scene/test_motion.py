@@ -143,12 +143,12 @@ def test_rows_are_near_those_that_are_solved_at_their_instants(
         at = scene.samples_at(np.array([frame / RATE_HZ + row * 1e-4]))[0]
         place = Keyframe(-1, float(at.x_mm[0]), float(at.y_mm[0]), 9)
         still = TouchTrack((place,), ShortCircuit(float(at.contrast[0])), hold=True)
-        solved, quiet = (
+        solved, untouched = (
             simulated(replace(scene, touches=touches, solver="factorise"))[frame]
             for touches in ((still,), ())
         )
         wrong.append(done[frame, row] - solved[row])
-        signal.append(solved - quiet)
+        signal.append(solved - untouched)
     assert 0 < np.sqrt(np.mean(np.square(wrong))) < most * np.sqrt(np.mean(np.square(signal)))
 
 
@@ -181,7 +181,7 @@ def test_rows_may_be_asked_for_at_other_instants(mesh_cache):
     assert np.array_equal(maker.frame(3), maker.frame(3, nominal))
     half = maker.frame(3, nominal + 0.5 / RATE_HZ)
     assert not np.array_equal(half, maker.frame(3))
-    assert np.array_equal(maker.frame(1), maker.frame(1, nominal))  # quiet: no touch
+    assert np.array_equal(maker.frame(1), maker.frame(1, nominal))  # untouched: no touch
 
 
 def test_states_are_those_at_the_keyframes_and_steps_between():

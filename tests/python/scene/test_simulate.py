@@ -70,7 +70,7 @@ def test_conductivity_is_the_mean_over_the_element(mesh):
 def test_a_touch_without_contrast_changes_nothing(mesh):
     touches = scenes_of((TrueTouch(10, 10, 9, 1.0),), ())
     clean = simulate(SKIN, PROTOCOL, touches, measurement=CLEAN, mesh=mesh)
-    assert np.abs(clean.differences_v()).max() < 1e-12 * np.abs(clean.exact_quiet_v).max()
+    assert np.abs(clean.differences_v()).max() < 1e-12 * np.abs(clean.exact_untouched_v).max()
     assert (clean.noise_v, clean.lsb_v, clean.clipped) == (0.0, 0.0, 0)
     assert (clean.contact_impedance_ohm_m2 == 0.01).all()
 
@@ -80,7 +80,7 @@ def test_conductive_touches_lower_the_voltages_that_drive(mesh):
     drop across."""
     touches = scenes_of((TrueTouch(0, 60, 10, 8.0),), (TrueTouch(0, 60, 10, 0.1),))
     clean = simulate(SKIN, PROTOCOL, touches, measurement=CLEAN, mesh=mesh)
-    v = np.array([clean.exact_quiet_v, *clean.exact_v])
+    v = np.array([clean.exact_untouched_v, *clean.exact_v])
     across = np.abs(v.reshape(-1, 16, 13).sum(axis=2)).sum(axis=1)
     assert across[1] < across[0] < across[2]
 
@@ -88,8 +88,10 @@ def test_conductive_touches_lower_the_voltages_that_drive(mesh):
 def test_noise_has_the_stated_ratio(mesh):
     how = Measurement(snr_db=50.0, adc_bits=None, quiet_frames=64)
     noisy = simulate(SKIN, PROTOCOL, TOUCHES, measurement=how, mesh=mesh)
-    noise = np.concatenate([noisy.frames_v - noisy.exact_v, noisy.quiet_v - noisy.exact_quiet_v])
-    rms = np.sqrt((noisy.exact_quiet_v**2).mean())
+    noise = np.concatenate(
+        [noisy.frames_v - noisy.exact_v, noisy.untouched_v - noisy.exact_untouched_v]
+    )
+    rms = np.sqrt((noisy.exact_untouched_v**2).mean())
     assert noisy.noise_v == pytest.approx(rms / 10**2.5)
     assert noise.std() == pytest.approx(noisy.noise_v, rel=0.02)
     assert abs(noise.mean()) < 4 * noisy.noise_v / np.sqrt(noise.size)
@@ -97,20 +99,20 @@ def test_noise_has_the_stated_ratio(mesh):
 
 
 def test_converter_steps_are_whole_and_as_stated(session):
-    span = 1.25 * np.abs(session.exact_quiet_v).max()
+    span = 1.25 * np.abs(session.exact_untouched_v).max()
     assert session.lsb_v == pytest.approx(2 * span / 4096)
     steps = session.frames_v / session.lsb_v
     assert np.abs(steps - np.round(steps)).max() < 1e-6
     assert session.clipped == 0
-    off = np.abs(session.quiet_v - session.exact_quiet_v).max()
+    off = np.abs(session.untouched_v - session.exact_untouched_v).max()
     assert off < 5 * session.noise_v + session.lsb_v
 
 
 def test_a_small_converter_clips_and_says_so(mesh):
     how = replace(CLEAN, adc_bits=12, adc_headroom=0.5)
     tight = simulate(SKIN, PROTOCOL, TOUCHES, measurement=how, mesh=mesh)
-    span = 0.5 * np.abs(tight.exact_quiet_v).max()
-    seen = (*tight.exact_v, tight.exact_quiet_v, tight.exact_quiet_v)
+    span = 0.5 * np.abs(tight.exact_untouched_v).max()
+    seen = (*tight.exact_v, tight.exact_untouched_v, tight.exact_untouched_v)
     assert tight.clipped == np.count_nonzero(np.abs(seen) > span) > 0
     assert tight.frames_v.min() >= -span and tight.frames_v.max() < span
 
@@ -123,7 +125,9 @@ def test_contacts_are_spread_within_bounds_and_shared(session):
 
 def test_sessions_repeat_and_are_independent_of_their_length(session, mesh):
     again = simulate(SKIN, PROTOCOL, TOUCHES, mesh=mesh)
-    assert (again.frames_v == session.frames_v).all() and (again.quiet_v == session.quiet_v).all()
+    assert (again.frames_v == session.frames_v).all() and (
+        again.untouched_v == session.untouched_v
+    ).all()
     short = simulate(SKIN, PROTOCOL, random_touches(SKIN.outline, 5, 2), mesh=mesh)
     assert (short.frames_v == session.frames_v[:2]).all()
 
@@ -143,8 +147,10 @@ def test_sources_do_not_disturb_each_other(session, mesh):
     other = simulate(SKIN, PROTOCOL, TOUCHES, measurement=analog, seed=6, mesh=mesh)
     assert abs(np.corrcoef(noise_of(other).ravel(), noise_of(without).ravel())[0, 1]) < 0.15
     assert (other.contact_impedance_ohm_m2 != session.contact_impedance_ohm_m2).all()
-    quiet = (with_contacts.quiet_v[:4] - with_contacts.exact_quiet_v) / with_contacts.noise_v
-    assert abs(np.corrcoef(quiet.ravel(), noise_of(with_contacts).ravel())[0, 1]) < 0.15
+    untouched = (
+        with_contacts.untouched_v[:4] - with_contacts.exact_untouched_v
+    ) / with_contacts.noise_v
+    assert abs(np.corrcoef(untouched.ravel(), noise_of(with_contacts).ravel())[0, 1]) < 0.15
 
 
 def test_training_and_test_share_nothing(session, mesh):
@@ -153,10 +159,10 @@ def test_training_and_test_share_nothing(session, mesh):
     assert not set(train.touches.scenes[0].touches) & set(session.touches.scenes[0].touches)
 
 
-def test_reference_is_the_mean_quiet_frame(session):
-    assert session.quiet_v.shape == (64, 208)
-    quiet_v = session.quiet_v.sum(axis=0) / 64
-    assert session.differences_v() == pytest.approx(session.frames_v - quiet_v)
+def test_reference_is_the_mean_untouched_frame(session):
+    assert session.untouched_v.shape == (64, 208)
+    untouched_v = session.untouched_v.sum(axis=0) / 64
+    assert session.differences_v() == pytest.approx(session.frames_v - untouched_v)
 
 
 def test_as_frames_carries_the_truth(session):

@@ -112,7 +112,7 @@ def test_an_insulating_touch_is_resistive():
     assert frames.touch_sign.tolist() == [-1]
 
 
-def test_a_sudden_change_costs_one_state_and_leaves_the_quiet_frames():
+def test_a_sudden_change_costs_one_state_and_leaves_the_untouched_frames():
     effects = {"sheet_change": {"spread": 0.05, "at_s": 0.1}}
     changed = compile_scene(still_scene(6, touches=(), effects=effects))
     plain = simulate_frames(compile_scene(still_scene(6, touches=())))

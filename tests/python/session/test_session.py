@@ -1,4 +1,4 @@
-"""Sessions: one generator for all, bounded for ever, told by one message."""
+"""Sessions: one generator for all, bounded for ever, described by one message."""
 
 import json
 

@@ -20,14 +20,14 @@ ROOM = 8
 
 
 class Heard:
-    """A sink that keeps what it is told."""
+    """A sink that keeps what is written to it."""
 
     def __init__(self) -> None:
-        self.told: list[OutgoingMessage] = []
+        self.reported: list[OutgoingMessage] = []
         self.closed = threading.Event()
 
-    def write(self, told: OutgoingMessage) -> None:
-        self.told.append(told)
+    def write(self, reported: OutgoingMessage) -> None:
+        self.reported.append(reported)
 
     def close(self) -> None:
         self.closed.set()
@@ -40,21 +40,21 @@ class Stuck(Heard):
         super().__init__()
         self.free = threading.Event()
 
-    def write(self, told: OutgoingMessage) -> None:
+    def write(self, reported: OutgoingMessage) -> None:
         self.free.wait()
 
 
 class Dying(Heard):
     """Fails from the third on."""
 
-    def write(self, told: OutgoingMessage) -> None:
-        super().write(told)
-        if len(self.told) > 2:
+    def write(self, reported: OutgoingMessage) -> None:
+        super().write(reported)
+        if len(self.reported) > 2:
             raise OSError("the cable\nis out")
 
 
 class Away(Heard):
-    def write(self, told: OutgoingMessage) -> None:
+    def write(self, reported: OutgoingMessage) -> None:
         raise Dropped
 
 
@@ -86,7 +86,7 @@ def test_a_stuck_and_a_dying_sink_disturb_no_other(swipe, made, patient, monkeyp
             outputs.put(frame)
         stuck, good, dying, away = outputs.end({})
     whole = len(swipe.frames) + 1
-    assert [told.frame for told in made["good"].told[:-1]] == swipe.frames
+    assert [reported.frame for reported in made["good"].reported[:-1]] == swipe.frames
     assert (good["sent"], good["dropped"], good["failed"]) == (whole, 0, 0)
     assert (dying["sent"], dying["failed"], dying["error"]) == (2, whole - 2, "the cable is out")
     assert (away["sent"], away["dropped"], away["failed"]) == (0, whole, 0)
@@ -108,8 +108,8 @@ def test_an_impatient_session_never_waits(swipe, drives, made):
 
 
 def test_a_message_is_made_once_for_all(swipe):
-    told = OutgoingMessage(swipe.frames[20])
-    assert told.message is told.message and told.text is told.text
+    reported = OutgoingMessage(swipe.frames[20])
+    assert reported.message is reported.message and reported.text is reported.text
 
 
 REFUSED = [

@@ -88,8 +88,8 @@ def test_messages_take_what_the_conversion_sets(swipe, drives):
 
     status_class, parts = classes(defined["diagnostic_msgs/msg/DiagnosticArray"])
     notice = Notice("fault", "electrode 5 open", 1.0)
-    for told, level in ((frame.message(), b"\0"), (notice.message(), b"\1")):
-        table = ros2.diagnostics(told, now, "skin", "sim")
+    for reported, level in ((frame.message(), b"\0"), (notice.message(), b"\1")):
+        table = ros2.diagnostics(reported, now, "skin", "sim")
         made = {"status": parts["diagnostic_msgs/DiagnosticStatus"], "values": lambda: None}
         assert [one.level for one in fill(status_class(), table, made).status] == [level]
 

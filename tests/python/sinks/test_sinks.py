@@ -61,9 +61,9 @@ def check(messages: list[dict[str, Any]], swipe: Swipe) -> None:
         VALID.validate(message)
     frames = [message for message in messages if message["type"] == "frame"]
     assert [m["frame"] for m in frames] == [frame.number for frame in swipe.frames]
-    told = [[(t["id"], t["x_mm"], t["y_mm"]) for t in m["touches"]] for m in frames]
-    assert told == [[(t.id, t.x_mm, t.y_mm) for t in touches] for touches in swipe.touches]
-    assert sum(map(len, told)) > 30 and messages[-1]["type"] == "summary"
+    seen = [[(t["id"], t["x_mm"], t["y_mm"]) for t in m["touches"]] for m in frames]
+    assert seen == [[(t.id, t.x_mm, t.y_mm) for t in touches] for touches in swipe.touches]
+    assert sum(map(len, seen)) > 30 and messages[-1]["type"] == "summary"
     assert all(t["force_n"] is None for m in frames for t in m["touches"])
 
 
@@ -179,12 +179,12 @@ def test_tuio_of_drives(drives, osc):
             for one in item.touches
         ])  # fmt: skip
     assert len(expected) > len(drives.reports)
-    told = list[list[Any]]()
-    while len(told) < len(expected) + 1:
+    seen = list[list[Any]]()
+    while len(seen) < len(expected) + 1:
         _, kind, *values = heard.get(timeout=WAIT_S)
-        told += [[]] if kind == "source" else []
-        told[-1] += [tuple(values[:5])] if kind == "set" else []
-    assert told == [*expected, []]
+        seen += [[]] if kind == "source" else []
+        seen[-1] += [tuple(values[:5])] if kind == "set" else []
+    assert seen == [*expected, []]
 
 
 def test_tuio_lifts_its_fingers_where_the_stream_is_cut(swipe, osc):
@@ -359,8 +359,8 @@ def test_csv(swipe, drives, tmp_path):
     ]
     found = [row for row in rows if row["id"]]
     assert len({row["frame"] for row in rows}) == len(swipe.frames)
-    told = [(int(row["id"]), float(row["x_mm"])) for row in found]
-    assert told == [(t.id, t.x_mm) for touches in swipe.touches for t in touches]
+    seen = [(int(row["id"]), float(row["x_mm"])) for row in found]
+    assert seen == [(t.id, t.x_mm) for touches in swipe.touches for t in touches]
     assert {row["force_n"] for row in rows} == {""}
 
 
@@ -392,8 +392,8 @@ def test_mcap(swipe, drives, tmp_path):
     ]
     for message, report in zip(came["/reports"], drives.reports, strict=True):
         names = [field.name for field in fields(FollowedTouch)]
-        told = [tuple(getattr(touch, name) for name in names) for touch in message.touches]
-        assert told == [astuple(touch) for touch in report.touches]
+        seen = [tuple(getattr(touch, name) for name in names) for touch in message.touches]
+        assert seen == [astuple(touch) for touch in report.touches]
 
 
 KILLED = """
@@ -470,10 +470,10 @@ def test_foxglove(swipe, drives):
         while len(came[2]) < len(drives.reports):
             take(WAIT_S)
         assert came[1]
-    told = [json.loads(payload) for payload in came[0][-len(swipe.frames) + 1 :]]
-    for message in told:
+    seen = [json.loads(payload) for payload in came[0][-len(swipe.frames) + 1 :]]
+    for message in seen:
         VALID.validate(message)
-    assert [m["frame"] for m in told] == [frame.number for frame in swipe.frames[1:]]
+    assert [m["frame"] for m in seen] == [frame.number for frame in swipe.frames[1:]]
     reports = [json.loads(payload) for payload in came[2]]
     assert reports == [report.message() for report in drives.reports]
     assert all(Draft202012Validator(described).is_valid(report) for report in reports)

@@ -16,9 +16,11 @@ from small_models import small, small_blob, small_model
 COUNT = 70
 
 
-def one_by_one(engine: str, frames: np.ndarray, quiet: np.ndarray) -> list[Reconstruction | str]:
+def one_by_one(
+    engine: str, frames: np.ndarray, untouched: np.ndarray
+) -> list[Reconstruction | str]:
     solver = Reconstructor(small_model(), engine=engine)
-    solver.tare(quiet)
+    solver.tare(untouched)
     found: list[Reconstruction | str] = []
     for frame in frames:
         solver.forget()
@@ -32,14 +34,14 @@ def one_by_one(engine: str, frames: np.ndarray, quiet: np.ndarray) -> list[Recon
 @pytest.mark.parametrize("engine", ["c", "c64"])
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_the_same_as_one_after_another(engine, threads):
-    frames, quiet = small().frames(41, COUNT), small().quiet(42, 8)
+    frames, untouched = small().frames(41, COUNT), small().untouched(42, 8)
     frames[3, 5:9] = np.nan  # left out; the basis is made again, and once more for the next frame
     frames[11] = np.nan  # refused
     frames[20] = 0.0
-    frames[30] = quiet.mean(axis=0)  # no touch
+    frames[30] = untouched.mean(axis=0)  # no touch
     batch = Batch(small_model(), threads=threads, engine=engine)
-    batch.tare(quiet)
-    expected = one_by_one(engine, frames, quiet)
+    batch.tare(untouched)
+    expected = one_by_one(engine, frames, untouched)
     results = list(batch.each(frames))
     assert len(results) == COUNT and sum(isinstance(result, FrameError) for result in results) == 2
     for one, other in zip(expected, results, strict=True):
@@ -56,9 +58,9 @@ def test_the_same_as_one_after_another(engine, threads):
 
 
 def test_a_second_batch_and_no_touches():
-    frames, quiet = small().frames(43, 9), small().quiet(42, 8)
+    frames, untouched = small().frames(43, 9), small().untouched(42, 8)
     batch = Batch(small_model(), threads=2, blob=small_blob())
-    assert batch.tare(quiet[0]).frames == 1
+    assert batch.tare(untouched[0]).frames == 1
     first = [r for r in batch.each(frames) if isinstance(r, Reconstruction)]
     again = [r for r in batch.each(frames, touches=False) if isinstance(r, Reconstruction)]
     assert [r.image.tobytes() for r in first] == [r.image.tobytes() for r in again]
@@ -67,35 +69,35 @@ def test_a_second_batch_and_no_touches():
 
 
 def test_options_masks_and_engines_reach_every_thread():
-    frames, quiet = small().frames(44, 12), small().quiet(42, 8)
+    frames, untouched = small().frames(44, 12), small().untouched(42, 8)
     options = replace(default_options(small_model()), iterations=7, sign="both", diagnostics=0)
     mask = np.zeros(frames.shape[1], dtype=np.bool_)
     mask[:6] = True
     batch = Batch(small_model(), threads=3, options=options)
     batch.mask_rows(mask)
-    batch.tare(quiet)
+    batch.tare(untouched)
     for result in batch.each(frames):
         assert isinstance(result, Reconstruction)
         assert result.info.iterations in (0, 7) and result.info.masked == 6
 
 
 def test_reconstruct_many_names_the_frame():
-    frames, quiet = small().frames(45, 5), small().quiet(42, 8)
-    results = reconstruct_many(small_model(), frames, quiet, threads=2)
-    expected = one_by_one("c", frames, quiet)
+    frames, untouched = small().frames(45, 5), small().untouched(42, 8)
+    results = reconstruct_many(small_model(), frames, untouched, threads=2)
+    expected = one_by_one("c", frames, untouched)
     assert [one.info.macs for one in results] == [one.info.macs for one in expected]
     frames[4] = np.nan
     with pytest.raises(FrameError, match=r"^frame 4 \(from 0\): "):
-        reconstruct_many(small_model(), frames, quiet, threads=2)
+        reconstruct_many(small_model(), frames, untouched, threads=2)
 
 
 def test_c_runs_without_pythons_lock():
     """While one thread is in C, this one counts: it would stand still for as long if the lock were
     held."""
-    frames, quiet = small().frames(46, 4), small().quiet(42, 8)
+    frames, untouched = small().frames(46, 4), small().untouched(42, 8)
     options = replace(default_options(small_model()), iterations=60_000, solver="fista")
     batch = Batch(small_model(), threads=1, options=options)
-    batch.tare(quiet)
+    batch.tare(untouched)
     counted, done = [0], threading.Event()
 
     def work() -> None:

@@ -51,7 +51,7 @@ def test_small_models(solver, storage, data_kind, width):
         for engine in engines:
             chosen = default_options(small_model(storage, data_kind))
             engine.set_options(replace(chosen, solver=solver, sign=sign, warm_start=True))
-            engine.set_reference(s.quiet(31, 8))
+            engine.set_reference(s.untouched(31, 8))
             engine.forget()
             results.append([engine.reconstruct(frame) for frame in frames])
         for of_builds in zip(*results, strict=True):
@@ -66,7 +66,7 @@ def test_a_noisy_tare(solver, width):
     s, engines = small(), built(small_blob("i8"), width)
     for engine in engines:
         engine.set_options(replace(default_options(small_model("i8")), solver=solver))
-        engine.set_reference(s.quiet(32, 8, noise=0.01))
+        engine.set_reference(s.untouched(32, 8, noise=0.01))
     for frame in s.frames(33, 4, noise=0.01):
         results = [engine.reconstruct(frame) for engine in engines]
         same(results)

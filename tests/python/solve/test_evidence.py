@@ -69,11 +69,16 @@ def made(engine: str, *, errors: bool = True, **options: object) -> Reconstructo
 
 
 def one(
-    engine: str, quiet_v: np.ndarray, frame_v: np.ndarray, *, errors: bool = True, **options: object
+    engine: str,
+    untouched_v: np.ndarray,
+    frame_v: np.ndarray,
+    *,
+    errors: bool = True,
+    **options: object,
 ) -> Reconstruction:
-    """``frame_v`` (m,) after a tare on ``quiet_v`` (k, m)."""
+    """``frame_v`` (m,) after a tare on ``untouched_v`` (k, m)."""
     reconstructor = made(engine, errors=errors, **options)
-    reconstructor.tare(quiet_v)
+    reconstructor.tare(untouched_v)
     return reconstructor.reconstruct(frame_v)
 
 
@@ -116,9 +121,9 @@ def agree(results: dict[str, Reconstruction], loose: float = 0.0) -> int:
 @pytest.mark.parametrize("name", [*WORLDS, *UNTOUCHED])
 def test_both_widths_find_the_same_touches_in_other_worlds(name):
     scenes = world(name)
-    for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
+    for untouched_v, frame_v in zip(scenes.untouched_v, scenes.frames_v, strict=True):
         loose = LAST_BIT if name == "no_touch_drift_2_percent" else 0.0
-        count = agree({engine: one(engine, quiet_v, frame_v) for engine in ENGINES}, loose)
+        count = agree({engine: one(engine, untouched_v, frame_v) for engine in ENGINES}, loose)
         assert (count == 0) == (name in UNTOUCHED)
 
 
@@ -129,10 +134,10 @@ def test_a_long_touch_has_no_other_beyond_it(name, k):
     """Without its shape a further disc at the rim would be clear; where the columns do not suffice
     to see that (fingers 1, ellipses 20), the linearisation does."""
     scenes = world(name, k + 1)
-    quiet_v, frame_v = scenes.quiet_v[k], scenes.frames_v[k]
-    count = agree({engine: one(engine, quiet_v, frame_v) for engine in ENGINES})
+    untouched_v, frame_v = scenes.untouched_v[k], scenes.frames_v[k]
+    count = agree({engine: one(engine, untouched_v, frame_v) for engine in ENGINES})
     assert count == len(scenes.scenes[k].touches)
-    assert len(one("c", quiet_v, frame_v, touch_test=0).touches) > count
+    assert len(one("c", untouched_v, frame_v, touch_test=0).touches) > count
 
 
 def test_the_tare_tells_how_far_a_skin_moves_places():
@@ -141,15 +146,15 @@ def test_the_tare_tells_how_far_a_skin_moves_places():
     on either."""
     model = prebuilt()[0]
     assert model.model_errors is not None
-    untold = encode_model(replace(model, model_errors=replace(model.model_errors, places=None)))
+    without = encode_model(replace(model, model_errors=replace(model.model_errors, places=None)))
     least: dict[str, list[float]] = {}
     for name in ("discs_1_to_3", "uneven_20_percent", "misplaced_3_mm"):
         scenes = world(name, 6)
-        for content in (blob(), untold):
+        for content in (blob(), without):
             solver = Reconstructor(decode_model(content, "x"), blob=content)
             variances = []
-            for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
-                solver.tare(quiet_v)
+            for untouched_v, frame_v in zip(scenes.untouched_v, scenes.frames_v, strict=True):
+                solver.tare(untouched_v)
                 touches = solver.reconstruct(frame_v).touches
                 variances += [float(np.min(covariance_mm2(touch)[::2])) for touch in touches]
             least.setdefault(name, []).append(float(np.median(variances)))
@@ -163,9 +168,9 @@ def test_the_tare_tells_how_far_a_skin_moves_places():
 def test_both_widths_stop_at_the_same_column(columns):
     """With the same touches, and a count that is said to be uncertain where they did."""
     for name in ("ellipses", "two_fingers_12_to_16_mm", "drift_2_percent_light"):
-        quiet_v, frame_v = world(name).quiet_v[0], world(name).frames_v[0]
+        untouched_v, frame_v = world(name).untouched_v[0], world(name).frames_v[0]
         results = {
-            engine: one(engine, quiet_v, frame_v, test_columns=columns) for engine in ENGINES
+            engine: one(engine, untouched_v, frame_v, test_columns=columns) for engine in ENGINES
         }
         assert agree(results) > 0
         warned = ["crowded" in result.info.diagnostics_by_name for result in results.values()]
@@ -175,13 +180,13 @@ def test_both_widths_stop_at_the_same_column(columns):
 
 def test_long_touches_are_ellipses_and_discs_are_not():
     """By the angle of the true long axis, or said to be a disc."""
-    told = 0
+    known = 0
     for name in ("ellipses", "fingers", "eight_at_4_radii", "uneven_20_percent"):
         scenes = world(name)
-        for scene, quiet_v, frame_v in zip(
-            scenes.scenes, scenes.quiet_v, scenes.frames_v, strict=True
+        for scene, untouched_v, frame_v in zip(
+            scenes.scenes, scenes.untouched_v, scenes.frames_v, strict=True
         ):
-            for touch in one("c", quiet_v, frame_v).touches:
+            for touch in one("c", untouched_v, frame_v).touches:
                 near = min(
                     scene.touches, key=lambda t: np.hypot(t.x_mm - touch.x_mm, t.y_mm - touch.y_mm)
                 )
@@ -192,8 +197,8 @@ def test_long_touches_are_ellipses_and_discs_are_not():
                 off = (np.degrees(np.arctan2(y, x)) - near.shape.angle_deg + 90) % 180 - 90
                 assert abs(off) <= 15
                 assert 1 < (x * x + y * y) / touch.radius_mm**2 < 4.5
-                told += 1
-    assert told >= 4
+                known += 1
+    assert known >= 4
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -201,23 +206,23 @@ def test_touches_that_a_drift_of_the_skin_makes_are_found_without_the_test_alone
     engine,
 ):
     scenes = world("no_touch_drift_2_percent")
-    for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
-        assert not one(engine, quiet_v, frame_v).touches
-        assert len(one(engine, quiet_v, frame_v, touch_test=0).touches) > 3
+    for untouched_v, frame_v in zip(scenes.untouched_v, scenes.frames_v, strict=True):
+        assert not one(engine, untouched_v, frame_v).touches
+        assert len(one(engine, untouched_v, frame_v, touch_test=0).touches) > 3
 
 
 @pytest.mark.parametrize("name", ["fingers", "drift_2_percent_light", "uneven_20_percent"])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_switched_off_it_is_as_if_the_model_did_not_say_what_it_may_be_wrong_by(engine, name):
     """Bit for bit; and without that section the options change nothing."""
-    quiet_v, frame_v = world(name).quiet_v[0], world(name).frames_v[0]
-    plain = one(engine, quiet_v, frame_v, errors=False)
+    untouched_v, frame_v = world(name).untouched_v[0], world(name).frames_v[0]
+    plain = one(engine, untouched_v, frame_v, errors=False)
     for result in (
-        one(engine, quiet_v, frame_v, **OFF),
-        one(engine, quiet_v, frame_v, errors=False, **OFF),
+        one(engine, untouched_v, frame_v, **OFF),
+        one(engine, untouched_v, frame_v, errors=False, **OFF),
     ):
         assert (result.image == plain.image).all() and result.touches == plain.touches
-    both = one(engine, quiet_v, frame_v)
+    both = one(engine, untouched_v, frame_v)
     assert not (both.image == plain.image).all()  # by the row gains
 
 
@@ -226,10 +231,10 @@ def test_row_gains_can_be_switched_after_the_tare(engine):
     """At once, without another tare, and back."""
     scenes = world("uneven_20_percent")
     expected = [
-        one(engine, scenes.quiet_v[0], scenes.frames_v[0], row_gains=on).image for on in (0, 1)
+        one(engine, scenes.untouched_v[0], scenes.frames_v[0], row_gains=on).image for on in (0, 1)
     ]
     reconstructor = made(engine)
-    reconstructor.tare(scenes.quiet_v[0])
+    reconstructor.tare(scenes.untouched_v[0])
     for on in (0, 1, 0):
         reconstructor.set_options(row_gains=on)
         image = reconstructor.reconstruct(scenes.frames_v[0]).image
@@ -251,7 +256,7 @@ def exact() -> tuple[np.ndarray, np.ndarray]:
     model, scenes = prebuilt()[0], world("discs_1_to_3")
     rms = float(np.sqrt((model.golden.reference_v**2).mean()))
     noise = 1e-6 * rms * np.random.default_rng(1).normal(size=(8, len(scenes.frames_v[0])))
-    added = scenes.frames_v[0] - scenes.quiet_v[0].mean(axis=0)
+    added = scenes.frames_v[0] - scenes.untouched_v[0].mean(axis=0)
     return model.golden.reference_v + noise, model.golden.reference_v + added
 
 
@@ -261,14 +266,14 @@ def test_row_gains_undo_what_multiplies_rows(engine):
     as without; where the reference is further from the model than a sheet makes it, or than
     reciprocity allows, rows are left as they are, the regularisation is the
     strongest, and one touch stays whatever the model makes of it."""
-    quiet_v, frame_v = exact()
-    straight = one(engine, quiet_v, frame_v)
+    untouched_v, frame_v = exact()
+    straight = one(engine, untouched_v, frame_v)
     assert straight.touches
     few, many = row_factors(0.12), row_factors(0.4)
-    undone = one(engine, few * quiet_v, few * frame_v)
+    undone = one(engine, few * untouched_v, few * frame_v)
     assert np.abs(sizes_mm(undone) - sizes_mm(straight)).max() <= 0.05
     assert "unlike the model" not in undone.info.diagnostics_by_name
-    left = one(engine, few * quiet_v, few * frame_v, row_gains=0)
+    left = one(engine, few * untouched_v, few * frame_v, row_gains=0)
     assert len(left.touches) != len(straight.touches) or (
         np.abs(sizes_mm(left) - sizes_mm(straight)).max() > 0.2
     )
@@ -276,13 +281,13 @@ def test_row_gains_undo_what_multiplies_rows(engine):
     turned[prebuilt()[0].fold.second] = 1.2
     for factors in (many, turned):
         with_, without = (
-            one(engine, factors * quiet_v, factors * frame_v, row_gains=on, touch_test=0)
+            one(engine, factors * untouched_v, factors * frame_v, row_gains=on, touch_test=0)
             for on in (1, 0)
         )
         assert (with_.image == without.image).all()
         assert with_.info.regularisation == pytest.approx(1.0)
         assert "unlike the model" in with_.info.diagnostics_by_name
-        tested = one(engine, factors * quiet_v, factors * frame_v)
+        tested = one(engine, factors * untouched_v, factors * frame_v)
         assert 1 <= len(tested.touches) <= max(1, len(with_.touches))
 
 
@@ -290,12 +295,12 @@ def test_both_widths_place_the_unsure_touch_of_a_far_instrument_alike():
     """At the middle of the image's blob, with the seed's radius. Not with seed 1: its one disc is
     sure, and rounding decides by which of two places, 2.5 mm apart, its last fit in float32 ends.
     """
-    quiet_v, frame_v = exact()
+    untouched_v, frame_v = exact()
     placed = 0
     for seed in (0, 2, 3, 4):
         factors, others = (row_factors(0.8, 2 * seed + k) for k in range(2))
-        touched_v = factors * quiet_v[0] + others * (frame_v - quiet_v[0])
-        results = {engine: one(engine, factors * quiet_v, touched_v) for engine in ENGINES}
+        touched_v = factors * untouched_v[0] + others * (frame_v - untouched_v[0])
+        results = {engine: one(engine, factors * untouched_v, touched_v) for engine in ENGINES}
         assert agree(results, 1e-3) >= 1
         touch, *more = results["c64"].touches
         if not more and touch.confidence < CENTRE_SURE:
@@ -308,7 +313,7 @@ def test_both_widths_place_the_unsure_touch_of_a_far_instrument_alike():
 def test_both_widths_agree_with_rows_masked_and_lost():
     """Whether or not their reciprocals are in use."""
     fold, scenes = prebuilt()[0].fold, world("uneven_20_percent")
-    quiet_v, frame_v = scenes.quiet_v[0], scenes.frames_v[0]
+    untouched_v, frame_v = scenes.untouched_v[0], scenes.frames_v[0]
     mask = np.zeros(len(frame_v), dtype=bool)
     mask[fold.first[[3, 40]]] = mask[fold.second[[9, 71]]] = True
     single = frame_v.copy()
@@ -320,7 +325,7 @@ def test_both_widths_agree_with_rows_masked_and_lost():
         for engine in ENGINES:
             reconstructor = made(engine)
             reconstructor.mask_rows(mask)
-            reconstructor.tare(quiet_v)
+            reconstructor.tare(untouched_v)
             results[engine] = reconstructor.reconstruct(frame)
         # a lost row's covariance has what keeps its factors regular, in numpy and in C not the same
         assert agree(results, 2e-4 if frame is pair else 0.0) > 0
@@ -334,13 +339,13 @@ def test_a_noiseless_reference_makes_no_touch_of_a_millionth(engine, frames):
     rows are then left out as outliers."""
     generator, scenes = np.random.default_rng(3), world("no_touch_noiseless")
     reconstructor = made(engine)
-    for quiet_v, drifted_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
-        learned = reconstructor.tare(quiet_v[:frames])
+    for untouched_v, drifted_v in zip(scenes.untouched_v, scenes.frames_v, strict=True):
+        learned = reconstructor.tare(untouched_v[:frames])
         assert frames == 1 or (learned.noise_v > 0 and learned.lambda_noise > 0)
-        assert not reconstructor.reconstruct(quiet_v[0]).touches
+        assert not reconstructor.reconstruct(untouched_v[0]).touches
         assert not reconstructor.reconstruct(drifted_v).touches
         for _ in range(4):
-            changed = quiet_v[0] * (1 + 1e-6 * generator.normal(size=len(drifted_v)))
+            changed = untouched_v[0] * (1 + 1e-6 * generator.normal(size=len(drifted_v)))
             assert not reconstructor.reconstruct(changed).touches
 
 
@@ -350,9 +355,11 @@ def test_after_a_noiseless_reference_all_widths_find_the_same(frames):
     Below that nothing is."""
     golden = prebuilt()[0].golden
     reference_v = golden.reference_v.astype(float)
-    change_v, quiet_v = golden.frame_v - reference_v, np.tile(reference_v, (frames, 1))
+    change_v, untouched_v = golden.frame_v - reference_v, np.tile(reference_v, (frames, 1))
     for size in 10.0 ** -np.arange(10):
-        found = [sizes_mm(one(e, quiet_v, reference_v + size * change_v))[:, :2] for e in ENGINES]
+        found = [
+            sizes_mm(one(e, untouched_v, reference_v + size * change_v))[:, :2] for e in ENGINES
+        ]
         assert [len(each) for each in found] == [2 if size > 0.005 else size > 0.0005] * 3
         for each in found[1:]:
             assert each == pytest.approx(found[0], abs=0.02)
@@ -362,13 +369,13 @@ def test_after_a_noiseless_reference_all_widths_find_the_same(frames):
 def test_steps_of_a_converter_without_dither_are_no_touch_where_it_is_told_of_them(
     engine,
 ):
-    """Its quiet frames are all alike; a frame of steps would else be a change without noise."""
+    """Its untouched frames are all alike; a frame of steps would else be a change without noise."""
     scenes, without = world("no_touch_converter_without_dither", 4), 0
-    for quiet_v, frame_v in zip(scenes.quiet_v, scenes.frames_v, strict=True):
-        step_v = np.diff(np.unique(np.append(quiet_v[0], frame_v))).min()
+    for untouched_v, frame_v in zip(scenes.untouched_v, scenes.frames_v, strict=True):
+        step_v = np.diff(np.unique(np.append(untouched_v[0], frame_v))).min()
         reconstructor = made(engine, noise_floor_v=step_v / np.sqrt(12))
-        learned = reconstructor.tare(quiet_v)
+        learned = reconstructor.tare(untouched_v)
         assert learned.noise_v == pytest.approx(step_v / np.sqrt(12), rel=1e-6)
         assert not reconstructor.reconstruct(frame_v).touches
-        without += len(one(engine, quiet_v, frame_v).touches)
+        without += len(one(engine, untouched_v, frame_v).touches)
     assert without > 0

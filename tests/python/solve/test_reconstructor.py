@@ -14,13 +14,13 @@ from eitskin.solve.reconstructor import ENGINES, Reconstructor
 from small_models import prebuilt, session, small, small_blob, small_model, tiny_blob
 
 
-def made(engine: str = "c", quiet: bool = True, **options: object) -> Reconstructor:
-    """On the prebuilt model, tared on the session's 64 quiet frames."""
+def made(engine: str = "c", untouched: bool = True, **options: object) -> Reconstructor:
+    """On the prebuilt model, tared on the session's 64 untouched frames."""
     model, blob = prebuilt()
     reconstructor = Reconstructor(model, engine=engine, blob=blob)
     reconstructor.set_options(**options)
-    if quiet:
-        reconstructor.tare(session().quiet_v)
+    if untouched:
+        reconstructor.tare(session().untouched_v)
     return reconstructor
 
 
@@ -72,16 +72,16 @@ def test_references_of_another_shape(engine, frames):
 
 def test_no_frame_before_a_reference(engine):
     with pytest.raises(FrameError, match="no reference frame has been set"):
-        made(engine, quiet=False).reconstruct(session().frames_v[0])
+        made(engine, untouched=False).reconstruct(session().frames_v[0])
 
 
 @pytest.mark.parametrize("count", [1, 4, 16])
 def test_an_all_zero_reference_is_refused(engine, count):
     with pytest.raises(FrameError, match="all voltages are zero; is the skin driven and connected"):
-        made(engine, quiet=False).tare(np.zeros((count, 208)))
+        made(engine, untouched=False).tare(np.zeros((count, 208)))
 
 
-def test_an_all_zero_frame_is_a_dead_front_end_not_a_quiet_skin(engine):
+def test_an_all_zero_frame_is_a_dead_front_end_not_an_untouched_skin(engine):
     reconstructor = made(engine)
     with pytest.raises(FrameError, match="all voltages are zero"):
         reconstructor.reconstruct(np.zeros(208))
@@ -91,14 +91,14 @@ def test_an_all_zero_frame_is_a_dead_front_end_not_a_quiet_skin(engine):
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_a_reference_must_be_whole(engine, value):
     for count in (1, 2, 8):
-        quiet = session().quiet_v[:count].copy()
-        quiet[count // 2, 11] = value
+        untouched = session().untouched_v[:count].copy()
+        untouched[count // 2, 11] = value
         where = rf"reference frame {count // 2} \(from 0\): row 11 \(from 0\)"
         with pytest.raises(FrameError, match=where):
-            made(engine, quiet=False).tare(quiet)
-    masked = made(engine, quiet=False)
+            made(engine, untouched=False).tare(untouched)
+    masked = made(engine, untouched=False)
     masked.mask_rows(np.arange(208) == 11)
-    masked.tare(quiet)
+    masked.tare(untouched)
     assert masked.reconstruct(session().frames_v[0]).info.masked == 1
 
 
@@ -118,7 +118,7 @@ def test_a_refused_series_leaves_no_reference(engine):
         reconstructor.reconstruct(session().frames_v[0])
 
 
-# ---- channels that cannot be used ----
+# ---- rows that cannot be used ----
 
 
 def test_too_many_bad_channels(engine):
@@ -127,21 +127,21 @@ def test_too_many_bad_channels(engine):
     frame[:104] = np.nan
     assert reconstructor.reconstruct(frame).info.masked == 104
     frame[104] = np.nan
-    with pytest.raises(FrameError, match="too many channels"):
+    with pytest.raises(FrameError, match="too many rows"):
         reconstructor.reconstruct(frame)
     reconstructor.set_options(max_masked=3)
     frame = session().frames_v[0].copy()
     frame[:4] = np.inf
-    with pytest.raises(FrameError, match="too many channels"):
+    with pytest.raises(FrameError, match="too many rows"):
         reconstructor.reconstruct(frame)
-    with pytest.raises(FrameError, match="too many channels"):
+    with pytest.raises(FrameError, match="too many rows"):
         reconstructor.reconstruct(np.full(208, np.nan))
 
 
 def test_saturated_channels_are_left_out(engine):
     reconstructor, frame = made(engine), session().frames_v[1]
     whole = reconstructor.reconstruct(frame)
-    limit = 1.5 * float(np.abs(session().quiet_v).max())
+    limit = 1.5 * float(np.abs(session().untouched_v).max())
     damaged = frame.copy()
     damaged[[3, 50, 171]] = [limit, -limit, 3 * limit]
     assert reconstructor.reconstruct(damaged).info.outliers == 3
@@ -154,7 +154,7 @@ def test_saturated_channels_are_left_out(engine):
     assert np.abs(saved.image - whole.image).max() < 0.1 * whole.image.max()
     for before in (0, 1, 7):
         with pytest.raises(FrameError, match=f"reference frame {before} .* row 3 .* saturated"):
-            reconstructor.tare(np.vstack([session().quiet_v[:before], damaged]))
+            reconstructor.tare(np.vstack([session().untouched_v[:before], damaged]))
 
 
 @pytest.mark.parametrize(
@@ -165,17 +165,18 @@ def test_masks_of_another_shape(engine, rows):
         made(engine).mask_rows(rows)
 
 
-# ---- quiet skins ----
+# ---- untouched skins ----
 
 
 def test_no_change_gives_no_touch(engine):
     reconstructor = made(engine)
     result = reconstructor.reconstruct(session().reference_v)
-    # numpy's mean of the quiet frames is this very frame; the core's differs from it by rounding
+    # numpy's mean of the untouched frames is this very frame; the core's differs from it by
+    # rounding
     assert result.info.stop in ("below-threshold", "zero")
     assert result.touches == () and not result.image.any()
-    reconstructor.tare(session().exact_quiet_v)
-    result = reconstructor.reconstruct(session().exact_quiet_v)
+    reconstructor.tare(session().exact_untouched_v)
+    result = reconstructor.reconstruct(session().exact_untouched_v)
     assert result.info.stop == "zero" and result.touches == () and not result.image.any()
     assert result.info.nonzeros == result.info.iterations == 0
 
@@ -272,7 +273,7 @@ EDGES = {
 
 @pytest.mark.parametrize("name", EDGES)
 def test_the_edges_of_the_ranges_are_inside_for_all(engine, name):
-    made(engine, quiet=False, **{name: EDGES[name]})
+    made(engine, untouched=False, **{name: EDGES[name]})
 
 
 def test_every_option_has_a_range():
@@ -340,4 +341,4 @@ def test_two_reconstructors_share_nothing():
 
 def test_the_reference_counts_no_macs():
     with pytest.raises(UsageError, match="counts no multiply-accumulates"):
-        made("numpy", quiet=False).set_options(mac_limit=5)
+        made("numpy", untouched=False).set_options(mac_limit=5)

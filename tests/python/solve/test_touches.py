@@ -23,10 +23,10 @@ def sizes_mm(touches: tuple[Touch, ...]) -> np.ndarray:
     return np.array([(t.x_mm, t.y_mm, t.radius_mm) for t in touches]).reshape(-1, 3)
 
 
-def compare(model: Model, quiet: np.ndarray, frames: np.ndarray, **options: object) -> int:
+def compare(model: Model, untouched: np.ndarray, frames: np.ndarray, **options: object) -> int:
     """Compare the widths over ``frames``; returns how many touches were found."""
     made, count = AllEngines(model, engines=("c", "c64"), **options), 0
-    made.tare(quiet)
+    made.tare(untouched)
     for frame in frames:
         found = {name: result.touches for name, result in made.reconstruct(frame).items()}
         narrow, wide = found["c"], found["c64"]
@@ -58,14 +58,14 @@ def test_simulated_frames_of_the_paper_skin():
 @pytest.mark.parametrize("storage", STORAGES)
 def test_small_models(storage, data_kind):
     s = small()
-    assert compare(small_model(storage, data_kind), s.quiet(2, 32), s.frames(7, 10)) >= 10
+    assert compare(small_model(storage, data_kind), s.untouched(2, 32), s.frames(7, 10)) >= 10
 
 
 def test_both_signs_and_dropouts():
     s = small()
     frames = s.frames(17, 12, "both")
     frames[3, 20:26] = np.nan
-    assert compare(small_model(), s.quiet(2, 32), frames, sign="both") >= 12
+    assert compare(small_model(), s.untouched(2, 32), frames, sign="both") >= 12
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_a_resistive_change_is_a_touch_of_negative_strength():
     for sign, expected in (("decrease", -1), ("both", -1), ("increase", 0)):
         made = Reconstructor(model)
         made.set_options(sign=sign)
-        made.tare(s.quiet(1, 16, 1e-5))
+        made.tare(s.untouched(1, 16, 1e-5))
         touches = made.reconstruct(frame).touches
         if expected:
             assert np.sign(touches[0].strength_s_per_m_mm2) == expected

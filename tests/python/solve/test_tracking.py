@@ -24,8 +24,8 @@ FRAMES = 24
 
 @cache
 def stream() -> tuple[np.ndarray, np.ndarray]:
-    """Quiet frames and a stream at 40 dB: a finger that stays, one that moves and is lifted, one
-    that comes."""
+    """Untouched frames and a stream at 40 dB: a finger that stays, one that moves and is lifted,
+    one that comes."""
     scenes = []
     for k in range(FRAMES):
         touches = [Put(-40.0, 10.0, 9.0, 5.0)]
@@ -36,18 +36,18 @@ def stream() -> tuple[np.ndarray, np.ndarray]:
         scenes.append(TouchScene(str(k), tuple(touches)))
     drawn = TouchSet("stream", 5, tuple(scenes))
     made = simulate(paper_skin(), adjacent(16), drawn, measurement=Measurement(snr_db=40.0))
-    return made.quiet_v, made.frames_v
+    return made.untouched_v, made.frames_v
 
 
 def options(**changes: object) -> Options:
     return replace(tracking(default_options(prebuilt()[0])), **changes)
 
 
-def told(chosen: Options) -> list[tuple[Touch, ...]]:
+def reported(chosen: Options) -> list[tuple[Touch, ...]]:
     """Of each frame, by the C core in double."""
-    quiet_v, frames_v = stream()
+    untouched_v, frames_v = stream()
     made = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1], options=chosen)
-    made.tare(quiet_v)
+    made.tare(untouched_v)
     return [made.reconstruct(frame).touches for frame in frames_v]
 
 
@@ -77,7 +77,7 @@ def test_a_finger_keeps_its_id(changes):
     chosen = options(**changes)
     owner: dict[int, str] = {}
     first: dict[str, int] = {}
-    for k, touches in enumerate(told(chosen)):
+    for k, touches in enumerate(reported(chosen)):
         strengths = [touch.strength_s_per_m_mm2 for touch in touches]
         assert strengths == sorted(strengths, reverse=True)
         assert len({touch.id for touch in touches}) == len(touches)
@@ -102,20 +102,20 @@ def place(touch: Touch) -> tuple[float, float]:
 
 def test_what_went_before_changes_nothing():
     """An untouched skin before the stream: no report, then the same ids and places."""
-    quiet_v, frames_v = stream()
+    untouched_v, frames_v = stream()
     made = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1], options=options())
-    made.tare(quiet_v)
-    assert not any(made.reconstruct(frame).touches for frame in quiet_v[:12])
+    made.tare(untouched_v)
+    assert not any(made.reconstruct(frame).touches for frame in untouched_v[:12])
     after = [made.reconstruct(frame).touches for frame in frames_v]
-    assert after == told(options())
+    assert after == reported(options())
 
 
 def test_tracking_tells_fewer_false_touches_and_fewer_ids():
     """Of a detection threshold that lets noise pass, and without the test of touches, which does
     not."""
     low = {"detection_factor": 0.7, "touch_test": 0}
-    bare = told(replace(default_options(prebuilt()[0]), **low))
-    tracked = told(replace(options(), **low))
+    bare = reported(replace(default_options(prebuilt()[0]), **low))
+    tracked = reported(replace(options(), **low))
     ids = [len({touch.id for touches in some for touch in touches}) for some in (bare, tracked)]
     assert 3 <= ids[1] < ids[0]
     assert sum(map(len, tracked)) < sum(map(len, bare))
@@ -138,10 +138,10 @@ def test_what_a_board_sets_is_what_python_sets():
 
 def test_each_frame_by_itself_is_as_it_was():
     """Off by default: touches and places are those of a core that forgets before every frame."""
-    quiet_v, frames_v = stream()
+    untouched_v, frames_v = stream()
     made = [Reconstructor(prebuilt()[0], blob=prebuilt()[1]) for _ in range(2)]
     for one in made:
-        one.tare(quiet_v)
+        one.tare(untouched_v)
     for frame in frames_v:
         made[1].forget()
         followed, fresh = (one.reconstruct(frame).touches for one in made)

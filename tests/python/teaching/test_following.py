@@ -40,8 +40,8 @@ def drifting(seed: int = 4) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndar
     some = presses(STREAM, seed=2)
     pattern = np.random.default_rng(seed).normal(size=some.protocol.n_rows)
     creep = 3e-4 * np.arange(STREAM)[:, None] * pattern
-    quiet = some.untouched[:1] + noise(TARE, 9)
-    return quiet, some.untouched + creep, some.pressed + creep, some.place_mm
+    tare_v = some.untouched[:1] + noise(TARE, 9)
+    return tare_v, some.untouched + creep, some.pressed + creep, some.place_mm
 
 
 def strength(result: Reconstruction) -> float:
@@ -50,8 +50,8 @@ def strength(result: Reconstruction) -> float:
 
 def errors_mm(core: Reconstructor) -> np.ndarray:
     """Of each press in turn, the skin's width for none."""
-    quiet, untouched, pressed, place = drifting()
-    core.tare(quiet)
+    tare_v, untouched, pressed, place = drifting()
+    core.tare(tare_v)
     found = []
     for before, during in zip(untouched, pressed, strict=True):
         core.reconstruct(before)
@@ -73,11 +73,11 @@ def test_drift_between_presses_does_no_harm(model):
 def test_both_widths_follow_alike(model):
     """Presses on a skin that drifts, and a hand that rests while it dries; one frame to tare by, so
     that false touches are held back by what they explain."""
-    quiet, untouched, pressed, _ = drifting()
+    tare_v, untouched, pressed, _ = drifting()
     presses_in_turn = np.stack([untouched, pressed], axis=1).reshape(2 * STREAM, -1)[:12]
     frames = [*presses_in_turn, *np.linspace(1, 1.003, 6)[:, None] * pressed[5]]
     cores = AllEngines(model, engines=("c", "c64"), reference_frames=3)
-    cores.tare(quiet[:1])
+    cores.tare(tare_v[:1])
     held_back = 0
     for frame in frames:
         results = cores.reconstruct(frame)
@@ -117,8 +117,8 @@ def test_the_librarys_resting_hand_does_not_fade():
         for k, (x, y) in enumerate(place)
     )
     made = simulate(skin, protocol, TouchSet("presses", 1, scenes))
-    quiet = np.repeat(made.quiet_v[:1], len(place), axis=0)
-    core = Reconstructor(teach(Presses(protocol, quiet, made.frames_v, place), skin).model)
+    tare_v = np.repeat(made.untouched_v[:1], len(place), axis=0)
+    core = Reconstructor(teach(Presses(protocol, tare_v, made.frames_v, place), skin).model)
     scene = replace(find_scene("resting_hand"), rate_hz=1 / 16, frames=50, elements=1000)
     frames, time_s, worst = run_scene(scene), 16 * np.arange(scene.frames), {}
     for constant in (0, 4):

@@ -1,4 +1,4 @@
-"""A model taught from a few presses finds others without any sign; odd places are told."""
+"""A model taught from a few presses finds others without any sign; odd places are reported."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from eitskin.model.eitm import decode_model, encode_model
 from eitskin.teaching.kernel import Placement, placement_text
 from eitskin.teaching.left_out import CHI2_90, ellipse_factor, leave_one_out, without_own
 from eitskin.teaching.make import taught_model
-from eitskin.teaching.presses import aged, shifted
+from eitskin.teaching.presses import Presses, aged, shifted
 from eitskin.teaching.teach import Taught, best_share, near_sums, size_law, solve_presses, teach
 from simulated_presses import RADIUS_MM, SKIN, TRUE, presses
 
@@ -59,13 +59,20 @@ def test_a_press_left_out_has_no_part_in_the_noise():
     assert white @ white.T == pytest.approx(data @ inverse @ data.T)
 
 
-def test_shuffled_places_teach_nothing():
-    """Such a model is refused; made all the same, it answers about the middle, or anywhere."""
+def with_shuffled_places() -> Presses:
     some = presses(30)
-    shuffled = replace(some, place_mm=some.place_mm[np.random.default_rng(3).permutation(30)])
+    return replace(some, place_mm=some.place_mm[np.random.default_rng(3).permutation(30)])
+
+
+def test_shuffled_places_are_refused():
     with pytest.raises(FrameError, match="do not explain the voltages"):
-        teach(shuffled, SKIN)
-    made = teach(shuffled, SKIN, refuse=False).model
+        teach(with_shuffled_places(), SKIN)
+
+
+@pytest.mark.long("test_shuffled_places_are_refused")
+def test_shuffled_places_teach_nothing():
+    """Made all the same, such a model answers about the middle, or anywhere."""
+    made = teach(with_shuffled_places(), SKIN, refuse=False).model
     error, *_ = solve_presses(made, presses(40, seed=2))
     assert np.median(error) > 0.25 * 2 * RADIUS_MM
 
@@ -154,8 +161,8 @@ def test_odd_places_are_told_and_taught(change, note):
 
 def test_the_share_serves_single_presses_and_sums_of_two():
     """Few sums have no say; many may cost a few single presses, not more."""
-    alone, told = np.array([0.9, 0.94, 0.96, 1.0]), np.array([0.9, 0.85, 0.7, 0.5])
-    two = np.linspace(0, 1, 200)[None] < told[:, None]
+    alone, reported = np.array([0.9, 0.94, 0.96, 1.0]), np.array([0.9, 0.85, 0.7, 0.5])
+    two = np.linspace(0, 1, 200)[None] < reported[:, None]
     assert best_share(alone, two) == 1 and best_share(alone, two[:, :0]) == 2
     assert best_share(0.9 * alone, two[:, :0]) == 3
     place = presses(40).place_mm

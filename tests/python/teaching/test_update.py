@@ -1,5 +1,5 @@
 """A taught model after remounting or drying: a few presses adapt it, or it stays as it is; from the
-untouched skin alone it is told whether it fits."""
+untouched skin alone a model is checked for whether it fits."""
 
 from dataclasses import replace
 from typing import Any
@@ -62,9 +62,9 @@ def test_a_remounted_skin_is_found_again(model, count):
     assert (angle + 180) % 360 - 180 == pytest.approx(0, abs=3)
     middle = updated.move.to_old(np.array([new.skin.outline.centre_mm]), (0.0, 0.0))
     assert np.abs(middle).max() < 0.1
-    assert new.load is not None
+    assert new.force_law is not None
     strength = solve_presses(new, judged)[2]
-    depth = new.load.forces_at(judged.place_mm, strength)
+    depth = new.force_law.forces_at(judged.place_mm, strength)
     assert np.sqrt(np.mean((depth - judged.depth_mm) ** 2)) < 1.0
     assert known_of(new, "updated").presses == 40 + count
 

@@ -1,12 +1,12 @@
 """The skin as the multiplexers meet it: the amplitude of the voltage for the electrodes that are
 joined, from a scene's frames.
 
-Until the scene begins the quiet frames are shown, one a scan, over and over; ``restart_quiet``
-begins with the first again. Then frame floor(t rate_hz) is shown, t the board's time since the
-scene began, and the last one is held. A frame is one scan: which frame it is, is decided when a
-scan begins (a row that comes before the one before it); where touches move, each row is that of the
-time at which it is switched to. A frame's noise and front-end effects are the scene's; the scene's
-``adc`` effect is left out, since the emulated converter does that.
+Until the scene begins the untouched frames are shown, one a scan, over and over;
+``restart_untouched`` begins with the first again. Then frame floor(t rate_hz) is shown, t the
+board's time since the scene began, and the last one is held. A frame is one scan: which frame it
+is, is decided when a scan begins (a row that comes before the one before it); where touches move,
+each row is that of the time at which it is switched to. A frame's noise and front-end effects are
+the scene's; the scene's ``adc`` effect is left out, since the emulated converter does that.
 
 Electrodes that are no row of the scene's protocol, nor one with pairs exchanged or turned round,
 give 0 V (counted in ``unknown_rows``); so does a pair that is not joined.
@@ -38,28 +38,28 @@ class Moving(Rows, TypingProtocol):
 
 
 class AnalogSkin:
-    """``quiet_v`` (q, m) and ``frames_v`` (n rows of m): amplitudes in V, in the rows of
+    """``untouched_v`` (q, m) and ``frames_v`` (n rows of m): amplitudes in V, in the rows of
     ``protocol``, for its current; ``moving`` are ``frames_v`` where touches move while they are
     scanned."""
 
     def __init__(
         self,
         protocol: Protocol,
-        quiet_v: FloatArray,
+        untouched_v: FloatArray,
         frames_v: Rows,
         rate_hz: float,
         moving: Moving | None = None,
     ) -> None:
         self.protocol, self._moving = protocol, moving
-        self.quiet_v, self.frames_v, self.rate_hz = quiet_v, frames_v, rate_hz
+        self.untouched_v, self.frames_v, self.rate_hz = untouched_v, frames_v, rate_hz
         self.rows = rows_of(protocol)
         self.unknown_rows: Counter[Joined] = Counter()
         self.scans = 0
         self._began: int | None = None
         self._row = len(protocol.drive_measure)
-        self._shown: FloatArray = quiet_v[0]
-        self._quiet_next = 0
-        self._frame = -1  # of the scene, shown in this scan; -1 is a quiet one
+        self._shown: FloatArray = untouched_v[0]
+        self._untouched_next = 0
+        self._frame = -1  # of the scene, shown in this scan; -1 is an untouched one
 
     def begin(self, at: int) -> None:
         """Let the scene's time 0 be ``at`` (ticks)."""
@@ -103,8 +103,8 @@ class AnalogSkin:
     def _next_frame(self, at: int) -> None:
         self.scans += 1
         if self._began is None or at < self._began:
-            self._shown = self.quiet_v[self._quiet_next % len(self.quiet_v)]
-            self._quiet_next += 1
+            self._shown = self.untouched_v[self._untouched_next % len(self.untouched_v)]
+            self._untouched_next += 1
             self._frame = -1
         else:
             self._frame = min(self.frame_number(at), len(self.frames_v) - 1)

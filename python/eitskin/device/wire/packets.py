@@ -139,7 +139,7 @@ class RawFrame:
     quality: npt.NDArray[np.uint8]
 
     @property
-    def quiet(self) -> bool:
+    def untouched(self) -> bool:
         """Of a tare."""
         return bool(self.flags & RawFlags.REFERENCE)
 

@@ -86,7 +86,9 @@ class SequenceCheck:
         if ahead == 0:
             return self._accept(sequence, fingerprint, 0)
         if restart and ahead >= AHEAD:
-            if self._late_run and sequence == self._late_next:  # faults of its start, told before
+            if (
+                self._late_run and sequence == self._late_next
+            ):  # faults of its start, reported before
                 return self._revive(sequence, fingerprint)
             self._after_restart = (sequence + 1) % WRAP
             return 0

@@ -63,9 +63,9 @@ class Case:
         ``calibrated``."""
         return calibrated(self.reference, self.predicted, self.trusted)
 
-    def channel(self, number: int) -> str:
-        """Return a name such as "channel 17 [1, 2, 8, 9]"."""
-        return f"channel {number} {self.rows[number].tolist()}"
+    def row(self, number: int) -> str:
+        """Return a name such as "row 17 [1, 2, 8, 9]"."""
+        return f"row {number} {self.rows[number].tolist()}"
 
 
 def strength_groups(size: FloatArray, usable: BoolArray) -> list[IntArray]:
@@ -125,9 +125,9 @@ def correlation(a: FloatArray, b: FloatArray) -> float:
     return cosine(a - a.mean(), b - b.mean()) if a.size else 0.0
 
 
-def short_list(channels: Any) -> str:
+def short_list(rows: Any) -> str:
     """Return row numbers for a sentence, truncated after eight."""
-    return first_few(numbers(channels), 8)
+    return first_few(numbers(rows), 8)
 
 
 def numbers(array: Any) -> list[int]:

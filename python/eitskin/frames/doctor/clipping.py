@@ -7,45 +7,45 @@ import numpy as np
 
 from eitskin.arrays import BoolArray, FloatArray
 from eitskin.frames.doctor.case import Case, numbers
-from eitskin.frames.doctor.remedy import channel_remedy
+from eitskin.frames.doctor.remedy import row_remedy
 from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 
 MIN_TIES = 4
 TIES_PER_USUAL = 4.0
 SAME = 1e-9
-MIN_QUIET = 4
+MIN_UNTOUCHED = 4
 
 
 def check_clipping(case: Case) -> tuple[Case, CheckOutcome]:
     """Name rows that stand at a rail, in untouched or other frames, and rows that are stuck."""
     frames = np.vstack([case.frames.reference_voltage_v, case.frames.voltage_v])
     railed = at_rail(np.where(np.isfinite(frames), frames, 0.0))
-    quiet = len(case.frames.reference_voltage_v)
+    untouched = len(case.frames.reference_voltage_v)
     findings, trusted = [], case.trusted
-    channels = np.flatnonzero(railed.any(axis=0))
-    if len(channels):
-        names = [case.frames.frame_name[k] for k in np.flatnonzero(railed[quiet:].any(axis=1))]
+    rows = np.flatnonzero(railed.any(axis=0))
+    if len(rows):
+        names = [case.frames.frame_name[k] for k in np.flatnonzero(railed[untouched:].any(axis=1))]
         levels = sorted({float(value) for value in frames[railed]})
-        text = f"{len(channels)} channel(s) stand at a rail: lower the gain or the current"
+        text = f"{len(rows)} row(s) stand at a rail: lower the gain or the current"
         one_rail = levels[-1] - levels[0] < 1e-6
         evidence = {
-            "channels": numbers(channels),
+            "channels": numbers(rows),
             "rail_v": levels[:1] if one_rail else [levels[0], levels[-1]],
             "readings": int(railed.sum()),
-            "in_quiet_frames": int(railed[:quiet].sum()),
+            "in_quiet_frames": int(railed[:untouched].sum()),
             "frames": names,
         }
-        remedy = channel_remedy(case, channels)
+        remedy = row_remedy(case, rows)
         findings.append(Finding("saturated", FAULT, text, evidence, remedy))
-        trusted = trusted & ~railed[:quiet].any(axis=0)
+        trusted = trusted & ~railed[:untouched].any(axis=0)
     stuck = _stuck(case.frames.reference_voltage_v) & ~railed.any(axis=0)
     if stuck.any():
         found = numbers(np.flatnonzero(stuck))
         text = (
-            f"{len(found)} channel(s) read exactly the same in all {quiet} quiet frames while"
-            " others vary"
+            f"{len(found)} row(s) read exactly the same in all {untouched} untouched frames"
+            " while others vary"
         )
-        remedy = channel_remedy(case, found)
+        remedy = row_remedy(case, found)
         findings.append(Finding("stuck", FAULT, text, {"channels": found}, remedy))
         trusted = trusted & ~stuck
     return replace(case, trusted=trusted), CheckOutcome(tuple(findings))
@@ -72,18 +72,18 @@ def at_rail(frames: FloatArray) -> BoolArray:
         rest = values[(values > top / 2) & ~hits]
         different = len(np.unique(np.round(rest / (SAME * top))))
         usual = rest.size / different if rest.size else 1.0
-        channels = int(hits.any(axis=0).sum())
+        rows = int(hits.any(axis=0).sum())
         if hits.sum() >= max(MIN_TIES, TIES_PER_USUAL * usual) and (
-            rest.size or channels < frames.shape[1]
+            rest.size or rows < frames.shape[1]
         ):
             found |= hits
     return found
 
 
-def _stuck(quiet: FloatArray) -> BoolArray:
-    """Return the rows (m,) that do not change over at least MIN_QUIET untouched frames, provided
-    that most rows do change."""
-    if len(quiet) < MIN_QUIET:
-        return np.zeros(quiet.shape[1], dtype=bool)
-    still = np.ptp(np.nan_to_num(quiet), axis=0) == 0
+def _stuck(untouched: FloatArray) -> BoolArray:
+    """Return the rows (m,) that do not change over at least MIN_UNTOUCHED untouched frames,
+    provided that most rows do change."""
+    if len(untouched) < MIN_UNTOUCHED:
+        return np.zeros(untouched.shape[1], dtype=bool)
+    still = np.ptp(np.nan_to_num(untouched), axis=0) == 0
     return still if still.mean() < 0.5 else np.zeros_like(still)

@@ -23,7 +23,7 @@ from eitskin.frames.frames import Frames
 from eitskin.frames.homogeneous import homogeneous
 
 RENUMBER_FIRST = (
-    "how to repair findings that name an electrode or a channel: renumber by import first, then"
+    "how to repair findings that name an electrode or a row: renumber by import first, then"
     " examine again"
 )
 
@@ -49,14 +49,14 @@ def examine_case(subject: Subject) -> tuple[DoctorReport, Case]:
     chosen = choose_order(orders, tuple(cases), subject.given)
     case, numbering = check_numbering(cases[chosen.best])
     case, swaps = check_swaps(case)
-    outcomes += [chosen.outcome, replace(numbering, untold=()), swaps, check_frames(case)]
+    outcomes += [chosen.outcome, replace(numbering, inconclusive=()), swaps, check_frames(case)]
     case, sign = check_sign(case)
     case, clipping = check_clipping(case)
     case, wiring = check_wiring(case)
     if case.joined:
-        text = "gains, single channels and numbering: separate the joined electrodes first"
+        text = "gains, single rows and numbering: separate the joined electrodes first"
         outcomes += [sign, clipping, wiring, check_reciprocity(case), check_noise(case)]
-        outcomes.append(CheckOutcome(untold=(text,)))
+        outcomes.append(CheckOutcome(inconclusive=(text,)))
         return _report(subject, case, outcomes), case
     resemblance = check_resemblance(case)
     if resemblance.findings:
@@ -67,7 +67,7 @@ def examine_case(subject: Subject) -> tuple[DoctorReport, Case]:
     case, gain = check_gain(case)
     outcomes += [sign, clipping, wiring, lost, flips, gain, resemblance]
     outcomes += [check_reciprocity(case), check_noise(case)]
-    outcomes.append(check_orientation(case, numbering.untold))
+    outcomes.append(check_orientation(case, numbering.inconclusive))
     outcomes.append(check_level(case) if subject.stand_in else check_unit(case, subject.unit_known))
     return _report(subject, case, outcomes), case
 
@@ -81,15 +81,18 @@ def _case(frames: Frames, subject: Subject) -> Case:
 
 def _report(subject: Subject, case: Case, outcomes: list[CheckOutcome]) -> DoctorReport:
     findings = tuple(finding for outcome in outcomes for finding in outcome.findings)
-    untold = (*subject.remarks, *(text for outcome in outcomes for text in outcome.untold))
+    inconclusive = (
+        *subject.remarks,
+        *(text for outcome in outcomes for text in outcome.inconclusive),
+    )
     if any(finding.name == "numbering" for finding in findings):
         if any(names_numbers(finding.repair) for finding in findings):
-            untold = (*untold, RENUMBER_FIRST)
+            inconclusive = (*inconclusive, RENUMBER_FIRST)
         findings = tuple(replace(f, repair="") if names_numbers(f.repair) else f for f in findings)
     frames = case.frames
     described = (
-        f"{frames.n_frames} frame(s) of {len(case.rows)} channels,"
-        f" {len(frames.reference_voltage_v)} quiet, {frames.protocol.n_electrodes} electrodes;"
+        f"{frames.n_frames} frame(s) of {len(case.rows)} rows,"
+        f" {len(frames.reference_voltage_v)} untouched, {frames.protocol.n_electrodes} electrodes;"
         f" compared with {case.prediction.source}"
     )
     measured: dict[str, object] = {}
@@ -99,7 +102,7 @@ def _report(subject: Subject, case: Case, outcomes: list[CheckOutcome]) -> Docto
         source=subject.source,
         subject=described,
         findings=findings,
-        untold=untold,
+        inconclusive=inconclusive,
         measured=measured,
         repair=combined_remedy(case, (finding.repair for finding in findings if finding.repair)),
     )

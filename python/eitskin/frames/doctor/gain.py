@@ -16,7 +16,7 @@ from eitskin.frames.doctor.case import (
     robust_spread,
     short_list,
 )
-from eitskin.frames.doctor.remedy import channel_remedy
+from eitskin.frames.doctor.remedy import row_remedy
 from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 
 WEAK_PER_RMS = 0.02
@@ -30,12 +30,12 @@ PAIR_AGREE = 0.75
 PAIR_SPREADS = 3.0
 MANY = 0.5
 FOREIGN_BELOW = 0.9
-MIN_CHANNELS = 8
+MIN_ROWS = 8
 UNIT_OFF = 30.0
 LEVEL_FAULT = 0.1
 
 
-def channel_gains(case: Case) -> tuple[FloatArray, BoolArray]:
+def row_gains(case: Case) -> tuple[FloatArray, BoolArray]:
     """Return reference over expected (m,), and which rows (m,) are trusted and strong enough for
     this ratio to have a meaning."""
     expected = case.expected()
@@ -46,7 +46,7 @@ def channel_gains(case: Case) -> tuple[FloatArray, BoolArray]:
 def outliers(case: Case) -> BoolArray:
     """Return the rows (m,) whose gain differs from 1 by more than OUTLIER and more than
     OUTLIER_SPREADS times the usual spread."""
-    gain, strong = channel_gains(case)
+    gain, strong = row_gains(case)
     limit = max(OUTLIER, OUTLIER_SPREADS * robust_spread(gain[strong]))
     return np.asarray(strong & (np.abs(gain - 1) > limit))
 
@@ -55,9 +55,9 @@ def check_resemblance(case: Case) -> CheckOutcome:
     """Check whether the reference resembles a homogeneous skin at all."""
     measured, predicted = case.reference[case.trusted], case.predicted[case.trusted]
     size = np.abs(predicted)
-    if size.size < MIN_CHANNELS or np.ptp(size) <= SAME * size.max():
+    if size.size < MIN_ROWS or np.ptp(size) <= SAME * size.max():
         return CheckOutcome(
-            untold=("whether this is a homogeneous skin: too few channels, or all alike",)
+            inconclusive=("whether this is a homogeneous skin: too few rows, or all alike",)
         )
     reached = correlation(np.abs(measured), size)
     summary = {"reference_correlation": round(reached, 4)}
@@ -82,29 +82,29 @@ def check_gain(case: Case) -> tuple[Case, CheckOutcome]:
     The gain of a row is its reference over the expected homogeneous value; the spread is 1.4826
     times the median distance from the median.
     """
-    gain, strong = channel_gains(case)
+    gain, strong = row_gains(case)
     if strong.sum() < 4:
-        return case, CheckOutcome(untold=("gains: too few channels are left",))
+        return case, CheckOutcome(inconclusive=("gains: too few rows are left",))
     spread = robust_spread(gain[strong])
     measured = {"gain_spread": round(spread, 4)}
     findings = _pair_findings(case, gain, strong, spread)
     off = outliers(case)
     off_alone = off & ~_of_pairs(case, findings)
     if off_alone.any() and off_alone.sum() < MANY * strong.sum():
-        channels = np.flatnonzero(off_alone)
-        worst = int(channels[np.argmax(np.abs(gain[channels] - 1))])
-        text = f"{len(channels)} channel(s) are far off: {short_list(channels)}; worst"
+        rows = np.flatnonzero(off_alone)
+        worst = int(rows[np.argmax(np.abs(gain[rows] - 1))])
+        text = f"{len(rows)} row(s) are far off: {short_list(rows)}; worst"
         evidence = {
-            "channels": numbers(channels),
+            "channels": numbers(rows),
             "worst_gain": round(float(gain[worst]), 4),
             "spread": round(spread, 4),
         }
-        text, remedy = f"{text} {case.channel(worst)}", channel_remedy(case, channels)
+        text, remedy = f"{text} {case.row(worst)}", row_remedy(case, rows)
         findings.append(Finding("channel-gain", FAULT, text, evidence, remedy))
     if spread >= SPREAD_NOTE and strong.sum() >= GROUP:
         fault = spread >= SPREAD_FAULT
         text = (
-            f"channels have different gains, spread {100 * spread:.1f} %: normalised differences"
+            f"rows have different gains, spread {100 * spread:.1f} %: normalised differences"
             f" {'are needed' if fault else 'may help'}"
         )
         limits = {"note_from": SPREAD_NOTE, "fault_from": SPREAD_FAULT}
@@ -120,7 +120,9 @@ def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
     """Check whether the numbers can be volts, if the skin's conductivity and the current are
     known."""
     if case.skin is None:
-        return CheckOutcome(untold=("the unit: it needs a skin with its conductivity (--skin)",))
+        return CheckOutcome(
+            inconclusive=("the unit: it needs a skin with its conductivity (--skin)",)
+        )
     if not case.trusted.any():
         return CheckOutcome()
     measured_v, per_a = (
@@ -143,7 +145,7 @@ def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
 def check_level(case: Case) -> CheckOutcome:
     """Check whether the voltages are as high as those of the stand-in for the skin, whose size is
     known. This covers generator, current source and receiver together."""
-    strong = channel_gains(case)[1]
+    strong = row_gains(case)[1]
     if not strong.any():
         return CheckOutcome()
     current_a = case.frames.protocol.current_a
@@ -177,9 +179,9 @@ def _pair_findings(case: Case, gain: FloatArray, strong: BoolArray, spread: floa
                 continue
             fault = off >= max(PAIR_FAULT, PAIR_SPREADS * spread)
             kind, remedy = (FAULT, "--equalise") if fault else (NOTE, "")
-            channels = numbers(np.flatnonzero(using))
-            evidence = {"pair": numbers(pair), "gain": round(middle, 4), "channels": channels}
-            text = f"channels {verb} pair {pair.tolist()} read {middle:.3g} times what others read"
+            rows = numbers(np.flatnonzero(using))
+            evidence = {"pair": numbers(pair), "gain": round(middle, 4), "channels": rows}
+            text = f"rows {verb} pair {pair.tolist()} read {middle:.3g} times what others read"
             findings.append(Finding(f"{name}-pair-gain", kind, text, evidence, remedy))
     return findings
 

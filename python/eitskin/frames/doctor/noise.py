@@ -10,11 +10,11 @@ import numpy as np
 
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.frames.doctor.case import Case, numbers, rms, short_list, strength_groups
-from eitskin.frames.doctor.remedy import channel_remedy
+from eitskin.frames.doctor.remedy import row_remedy
 from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 from eitskin.frames.orders import touching
 
-MIN_QUIET = 4
+MIN_UNTOUCHED = 4
 NOISY_TIMES = 4.0
 SNR_NOTE_DB = 45.0
 SNR_FAULT_DB = 30.0
@@ -24,41 +24,44 @@ DRIFT_FAULT = 0.02
 DRIFT_SIGMAS = 6.0
 
 
-def channel_noise(quiet: FloatArray) -> FloatArray:
+def row_noise(untouched: FloatArray) -> FloatArray:
     """Return the noise (m,) of each row from untouched frames (k, m)."""
-    return np.asarray(np.sqrt((np.diff(quiet, axis=0) ** 2).mean(axis=0) / 2))
+    return np.asarray(np.sqrt((np.diff(untouched, axis=0) ** 2).mean(axis=0) / 2))
 
 
 def check_noise(case: Case) -> CheckOutcome:
     """Report noisy rows, a low SNR, and drift."""
-    quiet = case.frames.reference_voltage_v
-    quiet = quiet[np.isfinite(quiet[:, case.trusted]).all(axis=1)]
-    if len(quiet) < MIN_QUIET:
-        few = f"noise, SNR and drift: {len(quiet)} quiet frame(s), they need at least {MIN_QUIET}"
-        return CheckOutcome(untold=(few,))
+    untouched = case.frames.reference_voltage_v
+    untouched = untouched[np.isfinite(untouched[:, case.trusted]).all(axis=1)]
+    if len(untouched) < MIN_UNTOUCHED:
+        few = (
+            f"noise, SNR and drift: {len(untouched)} untouched frame(s), they need at least"
+            f" {MIN_UNTOUCHED}"
+        )
+        return CheckOutcome(inconclusive=(few,))
     trusted = np.flatnonzero(case.trusted)
-    noise = channel_noise(quiet[:, trusted])
+    noise = row_noise(untouched[:, trusted])
     level, sigma = rms(case.reference[trusted]), rms(noise)
     if sigma == 0 or level == 0:
-        return CheckOutcome(untold=("noise and SNR: the quiet frames are all the same",))
+        return CheckOutcome(inconclusive=("noise and SNR: the untouched frames are all the same",))
     usual = np.maximum(_usual_noise(case, noise), np.median(noise) / NOISY_TIMES)
     noisy = (noise > NOISY_TIMES * usual) & (np.median(noise) > 0)
     healthy_sigma = rms(noise[~noisy]) or sigma
     snr, healthy_snr = (20 * np.log10(level / one) for one in (sigma, healthy_sigma))
     measured = {"snr_db": round(float(snr), 2), "noise_v": float(f"{sigma:.4g}")}
-    measured["quiet_frames"] = len(quiet)
+    measured["quiet_frames"] = len(untouched)
     findings: list[Finding] = []
     evidence: dict[str, object]
     if noisy.any():
-        channels = trusted[noisy]
-        shared = _common_electrode(case, channels)
-        text = f"{len(channels)} channel(s) are far noisier than the others: {short_list(channels)}"
-        remedy = channel_remedy(case, channels)
+        rows = trusted[noisy]
+        shared = _common_electrode(case, rows)
+        text = f"{len(rows)} row(s) are far noisier than the others: {short_list(rows)}"
+        remedy = row_remedy(case, rows)
         if shared is not None:
             text += f", all of electrode {shared} (from 0)"
             remedy = f"--drop-electrodes {shared}"
         evidence = {
-            "channels": numbers(channels),
+            "channels": numbers(rows),
             "times_usual": [round(float(v), 2) for v in noise[noisy] / usual[noisy]],
             "snr_db_without_them": round(float(healthy_snr), 2),
         }
@@ -70,13 +73,13 @@ def check_noise(case: Case) -> CheckOutcome:
         limits = {"note_below": SNR_NOTE_DB, "fault_below": SNR_FAULT_DB}
         evidence = {"snr_db": round(float(healthy_snr), 2), **limits}
         findings.append(Finding("snr", FAULT if fault else NOTE, text, evidence))
-    drift, uncertainty = _drift(quiet[:, trusted], case.reference[trusted], healthy_sigma)
+    drift, uncertainty = _drift(untouched[:, trusted], case.reference[trusted], healthy_sigma)
     measured["drift"] = float(f"{drift:.3g}")
     if abs(drift) > max(DRIFT_NOTE, DRIFT_SIGMAS * uncertainty):
         fault = abs(drift) > DRIFT_FAULT
         text = (
-            f"the gain drifts by {100 * drift:.2f} % over the {len(quiet)} quiet frames: take quiet"
-            " frames nearer in time, or project the reference out"
+            f"the gain drifts by {100 * drift:.2f} % over the {len(untouched)} untouched frames:"
+            " take untouched frames nearer in time, or project the reference out"
         )
         evidence = {"drift": round(drift, 5), "uncertainty": float(f"{uncertainty:.3g}")}
         evidence["fault_from"] = DRIFT_FAULT
@@ -93,20 +96,20 @@ def _usual_noise(case: Case, noise: FloatArray) -> FloatArray:
     return usual
 
 
-def _drift(quiet: FloatArray, reference: FloatArray, sigma: float) -> tuple[float, float]:
+def _drift(untouched: FloatArray, reference: FloatArray, sigma: float) -> tuple[float, float]:
     """Return the change of the common gain along its fitted line over all untouched frames, and the
     standard deviation of this change by noise."""
-    gain = quiet @ reference / (reference @ reference)
-    when = np.linspace(-0.5, 0.5, len(quiet))
+    gain = untouched @ reference / (reference @ reference)
+    when = np.linspace(-0.5, 0.5, len(untouched))
     slope = float(when @ gain / (when @ when))
     return slope, float(sigma / np.linalg.norm(reference) / np.sqrt(when @ when))
 
 
-def _common_electrode(case: Case, channels: IntArray) -> int | None:
-    """Return the electrode that is in all of ``channels``, if these are a large part of its
+def _common_electrode(case: Case, rows: IntArray) -> int | None:
+    """Return the electrode that is in all of ``rows``, if these are a large part of its
     rows."""
     for electrode in range(case.n_electrodes):
         using = touching(case.rows, [electrode]) & case.trusted
-        if using[channels].all() and len(channels) >= MAX_OF_ELECTRODE * np.count_nonzero(using):
+        if using[rows].all() and len(rows) >= MAX_OF_ELECTRODE * np.count_nonzero(using):
             return electrode
     return None

@@ -22,7 +22,7 @@ LIKELY = 0.9
 SHOWN = 3
 ALL_ALIKE = (
     "where electrode 0 is and in which direction the numbers run: on this symmetric skin, with this"
-    " protocol, a quiet frame is the same for all numberings"
+    " protocol, an untouched frame is the same for all numberings"
 )
 
 
@@ -86,7 +86,7 @@ def check_numbering(case: Case) -> tuple[Case, CheckOutcome]:
         [[correlation(np.abs(case.predicted), np.abs(frame)) for frame in side] for side in frames]
     )
     if (alike >= SAME_FRAME).all():
-        return case, CheckOutcome(untold=(ALL_ALIKE,))
+        return case, CheckOutcome(inconclusive=(ALL_ALIKE,))
     order = ranked(_likeness(case, frames))
     given, best = next(numbering for numbering in order if numbering.given), order[0]
     measured = {
@@ -97,11 +97,13 @@ def check_numbering(case: Case) -> tuple[Case, CheckOutcome]:
         like_given = [
             other for other in ranked(alike) if other.fit >= SAME_FRAME and not other.given
         ]
-        text = f"whether {' or '.join(map(str, like_given[:SHOWN]))}: the quiet frame is the same"
-        return case, CheckOutcome(untold=(text,) if like_given else (), measured=measured)
+        text = (
+            f"whether {' or '.join(map(str, like_given[:SHOWN]))}: the untouched frame is the same"
+        )
+        return case, CheckOutcome(inconclusive=(text,) if like_given else (), measured=measured)
     text = (
-        f"the quiet frame fits the skin's shape when the electrodes are renumbered ({best}), not as"
-        " they are"
+        f"the untouched frame fits the skin's shape when the electrodes are renumbered ({best}),"
+        " not as they are"
     )
     rows = relabel(case.rows, electrode_map(case.n_electrodes, best.rotate, best.mirror))
     finding = Finding("numbering", FAULT, text, measured["numbering_by_quiet_frame"], best.option)

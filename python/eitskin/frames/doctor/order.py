@@ -37,7 +37,10 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
     size = np.abs(cases[0].predicted)
     if own >= 0 and np.ptp(size) <= SAME * size.max():
         return OrderChoice(
-            own, CheckOutcome(untold=("the channel order: the protocol makes all channels alike",))
+            own,
+            CheckOutcome(
+                inconclusive=("the channel order: the protocol makes all channels alike",)
+            ),
         )
     reached = [likeness(case, allow_fault=False) for case in cases]
     if max(reached) < LIKELY:
@@ -116,19 +119,19 @@ def check_sign(case: Case) -> tuple[Case, CheckOutcome]:
         return signed_as_predicted(case), CheckOutcome((finding,))
     if cosine(measured, predicted) < 0:
         if some_negative or mixed:
-            text = "every channel has the opposite sign: V+ and V- (or I+ and I-) are exchanged"
+            text = "every row has the opposite sign: V+ and V- (or I+ and I-) are exchanged"
             finding = Finding("reversed", FAULT, text, evidence, "--sign reversed")
         else:
             text = (
                 "all voltages are above 0 where the homogeneous frame is below 0: reversed polarity"
-                " or magnitudes; no channel crosses 0, so they cannot be told apart, and both"
+                " or magnitudes; no row crosses 0, so they cannot be told apart, and both"
                 " options repair it alike"
             )
             finding = Finding("reversed-or-magnitude", FAULT, text, evidence, "--sign reversed")
         return _times(case, -1.0), CheckOutcome((finding,))
     if not mixed and positive_share > 0.5 and not some_negative:
         text = "whether these are magnitudes: the homogeneous frame is above 0 everywhere, too"
-        return case, CheckOutcome(untold=(text,))
+        return case, CheckOutcome(inconclusive=(text,))
     return case, CheckOutcome()
 
 
@@ -138,17 +141,17 @@ def check_flips(case: Case) -> tuple[Case, CheckOutcome]:
     predicted, expected = case.predicted, case.expected()
     ratio = np.divide(case.reference, expected, out=np.ones_like(expected), where=expected != 0)
     wrong = case.trusted & (np.abs(predicted) > 0.2 * rms(predicted)) & (ratio < -0.5)
-    channels = numbers(np.flatnonzero(wrong))
-    if not channels or case.magnitude:
+    rows = numbers(np.flatnonzero(wrong))
+    if not rows or case.magnitude:
         return case, CheckOutcome()
     drives = _whole_pairs(case, wrong, (0, 1)) | _whole_pairs(case, wrong, (2, 3))
     about = f"; all of {', '.join(sorted(drives))}" if drives else ""
     finding = Finding(
         "flipped-channels",
         FAULT,
-        f"{len(channels)} channel(s) have the wrong sign{about}",
-        {"channels": channels, "ratio_to_expected": round(float(np.median(ratio[channels])), 3)},
-        f"--flip-channels {','.join(map(str, channels))}",
+        f"{len(rows)} row(s) have the wrong sign{about}",
+        {"channels": rows, "ratio_to_expected": round(float(np.median(ratio[rows])), 3)},
+        f"--flip-channels {','.join(map(str, rows))}",
     )
     return _times(case, np.where(wrong, -1.0, 1.0)), CheckOutcome((finding,))
 
@@ -172,10 +175,10 @@ def _whole_pairs(case: Case, wrong: np.ndarray[Any, Any], columns: tuple[int, in
 
 def _times(case: Case, sign: FloatArray | float, magnitude: bool = False) -> Case:
     """Return ``case`` with its voltages, or their magnitudes, multiplied by ``sign`` (m,)."""
-    quiet, voltage = case.frames.reference_voltage_v, case.frames.voltage_v
+    untouched, voltage = case.frames.reference_voltage_v, case.frames.voltage_v
     if magnitude:
-        quiet, voltage = np.abs(quiet), np.abs(voltage)
-    frames = replace(case.frames, voltage_v=voltage * sign, reference_voltage_v=quiet * sign)
+        untouched, voltage = np.abs(untouched), np.abs(voltage)
+    frames = replace(case.frames, voltage_v=voltage * sign, reference_voltage_v=untouched * sign)
     return replace(case, frames=frames, magnitude=case.magnitude or magnitude)
 
 

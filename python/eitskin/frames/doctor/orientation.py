@@ -8,7 +8,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.frames.doctor.case import Case, cosine, rms
-from eitskin.frames.doctor.noise import MIN_QUIET, channel_noise
+from eitskin.frames.doctor.noise import MIN_UNTOUCHED, row_noise
 from eitskin.frames.doctor.numbering import Numbering, ranked, renumbered_frames
 from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 from eitskin.frames.homogeneous import touch_transfer
@@ -21,8 +21,8 @@ AUDIBLE = 3.0
 SHOWN = 3
 
 
-def check_orientation(case: Case, untold: tuple[str, ...]) -> CheckOutcome:
-    """Compare the changes by known touches with those of every numbering. ``untold`` are the
+def check_orientation(case: Case, inconclusive: tuple[str, ...]) -> CheckOutcome:
+    """Compare the changes by known touches with those of every numbering. ``inconclusive`` are the
     questions that the untouched frame left open."""
     measured, transfers = _changes(case)
     if not measured:
@@ -31,7 +31,7 @@ def check_orientation(case: Case, untold: tuple[str, ...]) -> CheckOutcome:
             why = "say where a touch was (--touch X,Y)"
         elif case.skin is None:
             why = "known touches need the skin (--skin)"
-        return CheckOutcome(untold=tuple(f"{text}: {why}" for text in untold))
+        return CheckOutcome(inconclusive=tuple(f"{text}: {why}" for text in inconclusive))
     size = np.abs(case.predicted)
     weight = 1 / np.maximum(size, WEAK_PER_GREATEST * size.max())
     order = ranked(_fits(case, measured, transfers, weight))
@@ -42,7 +42,7 @@ def check_orientation(case: Case, untold: tuple[str, ...]) -> CheckOutcome:
     if best.fit < LIKELY:
         if _drowned(case, measured, weight):
             text = "the known touches change the voltages by less than the noise"
-            return CheckOutcome(untold=(text,))
+            return CheckOutcome(inconclusive=(text,))
         text = (
             "the known touches do not explain the change in any numbering: wrong places, signs or"
             " frames"
@@ -51,7 +51,7 @@ def check_orientation(case: Case, untold: tuple[str, ...]) -> CheckOutcome:
     least = 1 - (1 - best.fit) * RIVAL_TIMES - CLOSE
     rivals = [numbering for numbering in order if numbering.fit >= least]
     if given in rivals:
-        return CheckOutcome(untold=_also(given, rivals), measured=summary)
+        return CheckOutcome(inconclusive=_also(given, rivals), measured=summary)
     text = (
         f"known touches are seen where they were if the electrodes are renumbered ({best}), not as"
         " given"
@@ -109,8 +109,8 @@ def _also(given: Numbering, rivals: list[Numbering]) -> tuple[str, ...]:
 def _drowned(case: Case, measured: list[FloatArray], weight: FloatArray) -> bool:
     """Return whether the weighted changes are below AUDIBLE times the weighted noise of one frame;
     False if the noise is unknown."""
-    quiet = case.frames.reference_voltage_v
-    if len(quiet) < MIN_QUIET:
+    untouched = case.frames.reference_voltage_v
+    if len(untouched) < MIN_UNTOUCHED:
         return False
-    noise = rms((np.nan_to_num(channel_noise(quiet)) * weight)[case.trusted])
+    noise = rms((np.nan_to_num(row_noise(untouched)) * weight)[case.trusted])
     return rms(np.array([(change * weight)[case.trusted] for change in measured])) < AUDIBLE * noise

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from eitskin.frames.doctor.case import Case, rms, short_list
-from eitskin.frames.doctor.gain import channel_gains
-from eitskin.frames.doctor.remedy import channel_remedy
+from eitskin.frames.doctor.gain import row_gains
+from eitskin.frames.doctor.remedy import row_remedy
 from eitskin.frames.doctor.report import FAULT, NOTE, CheckOutcome, Finding
 
 PAIR_FLOOR_PER_RMS = 0.1
@@ -32,8 +32,8 @@ def check_reciprocity(case: Case) -> CheckOutcome:
     )
     first, second, sign = pairs.first[both], pairs.second[both], pairs.sign[both]
     if not len(first):
-        text = "reciprocity: the protocol has no two channels of one voltage"
-        return CheckOutcome(untold=(text,))
+        text = "reciprocity: the protocol has no two rows of one voltage"
+        return CheckOutcome(inconclusive=(text,))
     reference = case.reference
     level = rms(reference[case.trusted])
     if level == 0:
@@ -43,7 +43,7 @@ def check_reciprocity(case: Case) -> CheckOutcome:
     error = np.abs(difference) / np.maximum(size, PAIR_FLOOR_PER_RMS * level)
     overall, usual = rms(difference) / level, float(np.median(error))
     order = np.argsort(-error, kind="stable")
-    gain = np.abs(channel_gains(case)[0] - 1)
+    gain = np.abs(row_gains(case)[0] - 1)
 
     def errors(pairs: Iterable[int]) -> dict[str, float]:
         return {f"{first[k]}/{second[k]}": round(float(error[k]), 4) for k in pairs}
@@ -59,15 +59,15 @@ def check_reciprocity(case: Case) -> CheckOutcome:
     if bad:
         off = [int(first[k] if gain[first[k]] > gain[second[k]] else second[k]) for k in bad]
         text = (
-            f"{len(bad)} pair(s) of channels that must agree do not; off in each is channel"
+            f"{len(bad)} pair(s) of rows that must agree do not; off in each is row"
             f" {short_list(off)}"
         )
         evidence = {"errors": errors(bad), "off": off, "median_of_all": round(usual, 4)}
-        remedy = channel_remedy(case, off)
+        remedy = row_remedy(case, off)
         findings.append(Finding("reciprocity-pairs", FAULT, text, evidence, remedy))
     fault = overall >= RMS_FAULT
     if fault or (overall >= RMS_NOTE and usual >= MEDIAN_NOTE and len(first) >= MIN_PAIRS):
-        text = f"reciprocal channels differ by {100 * overall:.1f} % of the rms voltage"
+        text = f"reciprocal rows differ by {100 * overall:.1f} % of the rms voltage"
         text += "; measured at different times, gains or currents" if fault else ""
         evidence = {"rms": round(overall, 4), "median": round(usual, 4)}
         evidence["worst_pairs"] = errors(order[:WORST])

@@ -7,13 +7,13 @@ from typing import Any
 from eitskin.frames.doctor.case import Case, numbers
 from eitskin.frames.repair import partners
 
-CHANNEL_LISTS = ("--flip-channels", "--impute-channels", "--drop-channels", "--drop-electrodes")
+ROW_LISTS = ("--flip-channels", "--impute-channels", "--drop-channels", "--drop-electrodes")
 
 
-def channel_remedy(case: Case, channels: Any) -> str:
-    """Return the options that fill ``channels`` from their reciprocal rows if those are trusted,
+def row_remedy(case: Case, rows: Any) -> str:
+    """Return the options that fill ``rows`` from their reciprocal rows if those are trusted,
     and leave out the others."""
-    bad = set(numbers(channels))
+    bad = set(numbers(rows))
     partner = partners(case.rows, case.n_electrodes)
     fill = sorted(
         k for k in bad if k in partner and partner[k][0] not in bad and case.trusted[partner[k][0]]
@@ -23,15 +23,15 @@ def channel_remedy(case: Case, channels: Any) -> str:
 
 
 def names_numbers(remedy: str) -> bool:
-    """Return whether ``remedy`` names channels or electrodes, whose numbers another numbering would
+    """Return whether ``remedy`` names rows or electrodes, whose numbers another numbering would
     change."""
-    return any(option in remedy for option in (*CHANNEL_LISTS, "--swap"))
+    return any(option in remedy for option in (*ROW_LISTS, "--swap"))
 
 
 def combined_remedy(case: Case, remedies: Iterable[str]) -> str:
     """Return one set of options from those of several findings. Lists are merged, and no row is
     filled from a bad one."""
-    lists: dict[str, set[int]] = {option: set() for option in CHANNEL_LISTS}
+    lists: dict[str, set[int]] = {option: set() for option in ROW_LISTS}
     others: list[str] = []
     for remedy in remedies:
         words = remedy.split()

@@ -32,11 +32,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class CheckOutcome:
-    """The result of one check: its ``findings``; ``untold``, the questions that it could not
+    """The result of one check: its ``findings``; ``inconclusive``, the questions that it could not
     decide, with reasons; and ``measured``, numbers by name."""
 
     findings: tuple[Finding, ...] = ()
-    untold: tuple[str, ...] = ()
+    inconclusive: tuple[str, ...] = ()
     measured: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -51,7 +51,7 @@ class DoctorReport:
     source: str
     subject: str
     findings: tuple[Finding, ...]
-    untold: tuple[str, ...]
+    inconclusive: tuple[str, ...]
     measured: Mapping[str, Any]
     repair: str = ""
 
@@ -74,7 +74,7 @@ class DoctorReport:
             "findings": [
                 vars(finding) | {"evidence": _finite(finding.evidence)} for finding in self.findings
             ],
-            "untold": list(self.untold),
+            "untold": list(self.inconclusive),
             "measured": _finite(self.measured),
             "repair": self.repair,
         }
@@ -91,7 +91,7 @@ class DoctorReport:
                 )
             if finding.repair:
                 lines.append(f"        repair: eitskin import ... {finding.repair}")
-        lines.extend(f"  not told: {text}" for text in self.untold)
+        lines.extend(f"  inconclusive: {text}" for text in self.inconclusive)
         if self.measured:
             lines.append(
                 "  measured: " + ", ".join(f"{k} {_shown(v)}" for k, v in self.measured.items())

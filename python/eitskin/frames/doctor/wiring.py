@@ -13,7 +13,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.frames.doctor.case import Case, numbers
-from eitskin.frames.doctor.gain import channel_gains, outliers
+from eitskin.frames.doctor.gain import outliers, row_gains
 from eitskin.frames.doctor.misfit import Joined, best_joined, misfit
 from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 from eitskin.frames.orders import touching
@@ -66,7 +66,7 @@ def check_wiring(case: Case) -> tuple[Case, CheckOutcome]:
 def check_lost(case: Case) -> CheckOutcome:
     """Report electrodes that drive in the untouched frames but stop driving in some of the
     others."""
-    gain, strong = channel_gains(case)
+    gain, strong = row_gains(case)
     usable = strong & (np.abs(gain) > LOST)
     findings = []
     for electrode in sorted(set(case.rows[:, :2].ravel().tolist())):
@@ -118,7 +118,7 @@ def _sides_off(case: Case, electrode: int) -> dict[str, float]:
 
     They stand out from similar rows; or, if too many of those are dead, by being nearly silent.
     """
-    off, (gain, _), strength = outliers(case), channel_gains(case), _strength(case)
+    off, (gain, _), strength = outliers(case), row_gains(case), _strength(case)
     sides = {}
     for name, columns in (("driving", [0, 1]), ("measuring", [2, 3])):
         using = (case.rows[:, columns] == electrode).any(axis=1) & case.trusted

@@ -28,10 +28,10 @@ NOT_FOR_THE_SKIN = frozenset(
 
 @dataclass(frozen=True, eq=False)
 class MeasuredBoard:
-    """What a board gave: ``quiet`` and ``touched`` frames, what it is, what it counted (None: a
+    """What a board gave: ``untouched`` and ``touched`` frames, what it is, what it counted (None: a
     recording)."""
 
-    quiet: RawRun
+    untouched: RawRun
     touched: RawRun
     info: BoardInfo
     stats: BoardStats | None
@@ -41,12 +41,12 @@ def measure(
     device: Device, frames: int, *, touched: bool, before_touches: Callable[[], None]
 ) -> MeasuredBoard:
     """``frames`` raw frames of the untouched skin, and where ``touched`` as many after
-    ``before_touches`` was called. A recording gives its own quiet frames, where it has some."""
+    ``before_touches`` was called. A recording gives its own untouched frames, where it has some."""
     first = collect(device, 0 if device.replays else frames)
     if device.replays:
-        quiet = replace(first, frames=first.quiet or first.frames[:frames])
-        after = replace(first, frames=first.frames if first.quiet else first.frames[frames:])
-        return MeasuredBoard(quiet, after if touched else RawRun(), device.board, None)
+        untouched = replace(first, frames=first.untouched or first.frames[:frames])
+        after = replace(first, frames=first.frames if first.untouched else first.frames[frames:])
+        return MeasuredBoard(untouched, after if touched else RawRun(), device.board, None)
     after = RawRun()
     if touched:
         before_touches()
@@ -64,8 +64,8 @@ def board_subject(
     protocol = scanned_protocol(measured.info, known, device.transport.name)
     if skin is None and known is not None:
         skin = known.model.skin
-    quiet, touched = measured.quiet.frames, measured.touched.frames
-    frames = as_frames(quiet, touched, protocol, measured.info, known, allow_nonfinite=True)
+    untouched, touched = measured.untouched.frames, measured.touched.frames
+    frames = as_frames(untouched, touched, protocol, measured.info, known, allow_nonfinite=True)
     remarks = () if measured.info.check_every == 1 else (
         "reciprocity of every row: the board measures one of each pair; scan fully with"
         "  eitskin stream --full",
@@ -76,7 +76,9 @@ def board_subject(
 def board_findings(report: DoctorReport, measured: MeasuredBoard) -> DoctorReport:
     """``report`` with what the board itself reports. Remedies of ``eitskin import`` are taken out,
     because a board is repaired by hand."""
-    raised = [fault for fault in (*measured.quiet.faults, *measured.touched.faults) if fault.raised]
+    raised = [
+        fault for fault in (*measured.untouched.faults, *measured.touched.faults) if fault.raised
+    ]
     reported = {
         (fault.code, fault.index if fault.code in ELECTRODE_FAULTS else 0): fault
         for fault in raised
@@ -84,7 +86,7 @@ def board_findings(report: DoctorReport, measured: MeasuredBoard) -> DoctorRepor
     own = [_finding(fault) for fault in reported.values()]
     codes = {fault.code for fault in raised}
     own += [_standing(code) for code in measured.info.fault_codes if code not in codes]
-    missing = measured.quiet.missing + measured.touched.missing
+    missing = measured.untouched.missing + measured.touched.missing
     if missing:
         text = f"{missing} packets were lost between board and host"
         own.append(Finding("board-link", NOTE, text, {"missing": missing}))

@@ -87,7 +87,7 @@ class HostTwin:
         self._board, self._protocol = board, known.model.protocol
         self._from_before = options.warm_start or options.reference_frames > 0
         self._tracks = options.tracks
-        self._quiet: list[RawFrame] = []
+        self._untouched: list[RawFrame] = []
         self._tared = self._sure = self._lost = self._events_known = False
         self._gestures = Gestures()
         self.check = HostCheck()
@@ -105,7 +105,7 @@ class HostTwin:
 
     def lost(self) -> None:
         """Something is missing here: perhaps a frame from which the next solve began, perhaps a
-        quiet one."""
+        untouched one."""
         self._sure, self._lost, self._events_known = False, True, False
         if self._drives is not None:
             self._drives.forget()
@@ -121,10 +121,10 @@ class HostTwin:
     def take(self, frame: Frame) -> Reconstruction | None:
         """The next frame; returns what this host makes of it, None where the board solved
         nothing."""
-        if frame.raw is not None and frame.raw.quiet:
-            self._quiet.append(frame.raw)
+        if frame.raw is not None and frame.raw.untouched:
+            self._untouched.append(frame.raw)
             return None
-        if self._quiet:
+        if self._untouched:
             self._tare()
         self._lost = False
         aligned = self._drive(frame.raw)
@@ -149,13 +149,15 @@ class HostTwin:
         return aligned
 
     def _tare(self) -> None:
-        quiet, self._quiet = self._quiet, []
+        untouched, self._untouched = self._untouched, []
         if self._lost:
             self._tared = False
             return
-        self._core.mask_rows(np.all([(raw.quality & Quality.MASKED) != 0 for raw in quiet], axis=0))
+        self._core.mask_rows(
+            np.all([(raw.quality & Quality.MASKED) != 0 for raw in untouched], axis=0)
+        )
         try:
-            self._core.tare(np.array([raw.voltage_v for raw in quiet]))
+            self._core.tare(np.array([raw.voltage_v for raw in untouched]))
         except FrameError:
             self._tared = False
             return

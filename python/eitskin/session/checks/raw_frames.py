@@ -23,11 +23,11 @@ from eitskin.skin.skin import skin_to_table
 
 @dataclass
 class RawRun:
-    """Raw frames in the order in which they were scanned, ``quiet`` ones apart, with the faults
+    """Raw frames in the order in which they were scanned, ``untouched`` ones apart, with the faults
     that were reported meanwhile and the packets that were lost. ``left_out``: frames before the
-    tare that ``quiet`` is of."""
+    tare that ``untouched`` is of."""
 
-    quiet: list[RawFrame] = field(default_factory=list)
+    untouched: list[RawFrame] = field(default_factory=list)
     frames: list[RawFrame] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
     missing: int = 0
@@ -57,10 +57,10 @@ def gather(messages: Iterable[Message]) -> RawRun:
                 run.missing += message.cause.missing
         elif isinstance(message, Frame) and message.raw is not None:
             if message.untouched and not taring:
-                run.left_out += len(run.frames) + len(run.quiet)
-                run.quiet, run.frames = [], []
+                run.left_out += len(run.frames) + len(run.untouched)
+                run.untouched, run.frames = [], []
             taring = message.untouched
-            (run.quiet if taring else run.frames).append(message.raw)
+            (run.untouched if taring else run.frames).append(message.raw)
     return run
 
 
@@ -68,9 +68,9 @@ def finite_only(frames: Frames, where: str) -> tuple[Frames, int]:
     """``frames`` without those that have a row which could not be measured, and how many these
     were."""
     good = np.asarray(np.isfinite(frames.voltage_v).all(axis=1))
-    quiet = np.asarray(np.isfinite(frames.reference_voltage_v).all(axis=1))
-    if not good.any() or not quiet.any():
-        which = "quiet frame" if good.any() else "frame"
+    untouched = np.asarray(np.isfinite(frames.reference_voltage_v).all(axis=1))
+    if not good.any() or not untouched.any():
+        which = "untouched frame" if good.any() else "frame"
         bad = frames.reference_voltage_v if good.any() else frames.voltage_v
         row = int(np.argmax((~np.isfinite(bad)).sum(axis=0)))
         raise FrameError(
@@ -81,7 +81,7 @@ def finite_only(frames: Frames, where: str) -> tuple[Frames, int]:
     kept = replace(
         frames,
         voltage_v=frames.voltage_v[good],
-        reference_voltage_v=frames.reference_voltage_v[quiet],
+        reference_voltage_v=frames.reference_voltage_v[untouched],
         frame_name=tuple(
             name for name, keep in zip(frames.frame_name, good.tolist(), strict=True) if keep
         ),
@@ -92,7 +92,7 @@ def finite_only(frames: Frames, where: str) -> tuple[Frames, int]:
 
 
 def as_frames(
-    quiet: Sequence[RawFrame],
+    untouched: Sequence[RawFrame],
     frames: Sequence[RawFrame],
     protocol: Protocol,
     info: BoardInfo,
@@ -101,15 +101,17 @@ def as_frames(
     allow_nonfinite: bool = False,
 ) -> Frames:
     """The frames, named by their numbers on the board and timed by its clock."""
-    if not quiet:
-        raise FrameError("there is no quiet frame, and images are made of what differs from them")
+    if not untouched:
+        raise FrameError(
+            "there is no untouched frame, and images are made of what differs from them"
+        )
     rows = protocol.n_rows
-    start = (frames[0] if frames else quiet[0]).time_us
+    start = (frames[0] if frames else untouched[0]).time_us
     skin = {} if known is None else {"skin": skin_to_table(known.model.skin)}
     result = Frames(
         protocol=protocol,
         voltage_v=np.array([raw.voltage_v for raw in frames], dtype=np.float64).reshape(-1, rows),
-        reference_voltage_v=np.array([raw.voltage_v for raw in quiet], dtype=np.float64),
+        reference_voltage_v=np.array([raw.voltage_v for raw in untouched], dtype=np.float64),
         frame_name=tuple(str(raw.frame) for raw in frames),
         time_s=np.array([((raw.time_us - start) % 2**32) / 1e6 for raw in frames]),
         meta={
@@ -123,13 +125,13 @@ def as_frames(
 
 
 def frames_of(path: str | Path, model: Path | None = None) -> Frames:
-    """The raw frames of a recording as frames, the quiet ones of its last tare as their reference;
-    rows that were masked or could not be measured are NaN. ``model``: the board's, where its
-    protocol is none of the usual.
+    """The raw frames of a recording as frames, the untouched ones of its last tare as their
+    reference; rows that were masked or could not be measured are NaN. ``model``: the board's, where
+    its protocol is none of the usual.
 
     Raises:
         FileError, DeviceError: it cannot be read, or the model is another.
-        FrameError: no raw frames were recorded, or no quiet ones.
+        FrameError: no raw frames were recorded, or no untouched ones.
     """
     with Device(FileTransport(path)) as device:
         name = str(path)
@@ -141,4 +143,6 @@ def frames_of(path: str | Path, model: Path | None = None) -> Frames:
                 f"{name}: holds no raw frames; record with raw streaming (eitskin record does by"
                 " default)"
             )
-        return as_frames(run.quiet, run.frames, protocol, device.board, known, allow_nonfinite=True)
+        return as_frames(
+            run.untouched, run.frames, protocol, device.board, known, allow_nonfinite=True
+        )

@@ -221,7 +221,7 @@ def _counting(field: Field, candidate: Candidate, value: float, number: int) -> 
 
 def _differences(session: FrameSession) -> FloatArray:
     measured = session.measured(SNR_DB)
-    return np.asarray(measured.frames_v[:, -1] - measured.quiet_v.mean(axis=0))
+    return np.asarray(measured.frames_v[:, -1] - measured.untouched_v.mean(axis=0))
 
 
 def _reconstructed(
@@ -229,7 +229,7 @@ def _reconstructed(
 ) -> tuple[Method, FloatArray]:
     method = candidate.make(field.setup, value)
     if isinstance(method, Learns):
-        method.learn(session.measured(SNR_DB).quiet_v)
+        method.learn(session.measured(SNR_DB).untouched_v)
     return method, np.asarray(method.reconstruct(dv), dtype=np.float64)
 
 

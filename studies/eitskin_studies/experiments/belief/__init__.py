@@ -60,7 +60,7 @@ def frames_of(finder: CoreFinder, of: WorldScenes) -> list[dict[str, Any]]:
     distance from the true place in mm and that over what it is said to be (Mahalanobis, squared);
     None where that is not known."""
     frames = []
-    for scene, *measured in zip(of.scenes, of.quiet_v, of.frames_v, of.step_v, strict=True):
+    for scene, *measured in zip(of.scenes, of.untouched_v, of.frames_v, of.step_v, strict=True):
         try:
             found = finder(*measured)
         except FrameError:

@@ -10,9 +10,14 @@ from eitskin_emulator.core_on_qemu import checkout_root
 from eitskin_studies.experiments.constants.in_time import fast_scenes, gesture_scenes
 from eitskin_studies.experiments.constants.judged import Scene
 from eitskin_studies.experiments.constants.models import of_other_models, of_presses
+from eitskin_studies.experiments.constants.protected import Tests, protecting
 from eitskin_studies.experiments.constants.scenes import SceneMaker
 from eitskin_studies.experiments.constants.sweep import Effect, baselines, effects_of
-from eitskin_studies.experiments.constants.tables import tables_of, words_of
+from eitskin_studies.experiments.constants.tables import (
+    any_change,
+    tables_of,
+    words_of,
+)
 from eitskin_studies.experiments.constants.variant import build_variant
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 
@@ -23,10 +28,11 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     """All constants.
 
     Raises:
-        UsageError: this is no checkout, there is no compiler, or no measured presses are given.
+        UsageError: this is no checkout, there is no compiler, the C tests are not built, or no
+            measured presses are given.
     """
     began = time.process_time()
-    variant = build_variant(workspace.folder / "variant")
+    variant = build_variant(workspace.folder / "variant", checkout_root())
     scenes = _scenes(SceneMaker.of(workspace))
     known = baselines(variant, scenes)
     effects: dict[str, list[Effect]] = {}
@@ -42,12 +48,18 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         )
         seconds += kept["seconds"]
         effects[constant.name] = [Effect(**one) for one in kept["effects"]]
+    still = [one for one in variant.constants if not one.is_size and not any_change(effects, one)]
+    needed = workspace.kept(
+        {"study": "constants", "tests of": [one.name for one in still]},
+        lambda: protecting(Tests(workspace.folder / "tests"), still),
+    )
     commit = _commit()
     facts = {"commit": commit, "seconds": round(seconds), "scenes": len(scenes)}
     return ExperimentOutcome(
-        tables_of(variant.constants, effects, commit),
+        tables_of(variant.constants, effects, needed, commit),
         {
             **facts,
+            "tests": needed,
             "constants": {
                 name: [asdict(effect) for effect in some] for name, some in effects.items()
             },
@@ -80,6 +92,12 @@ def _timed(make: Any) -> dict[str, Any]:
 
 
 def _commit() -> str:
-    command = ["git", "-C", str(checkout_root()), "describe", "--always", "--dirty"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return done.stdout.strip() or "unknown"
+    """The last one that changed the core or the table."""
+    core = ("--", "csrc", "tables/constants.toml")
+    changed = _git("status", "--porcelain", *core)
+    return (_git("log", "-1", "--format=%h", *core) or "unknown") + ("-dirty" if changed else "")
+
+
+def _git(*words: str) -> str:
+    command = ["git", "-C", str(checkout_root()), *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()

@@ -17,7 +17,7 @@ from eitskin_studies.experiments.fast_path import rows as fast_rows
 from eitskin_studies.experiments.fast_path.scans import Outcome, Player, Scan, TrueInTime
 from eitskin_studies.experiments.fast_path.states import ELEMENTS, draw_states
 from eitskin_studies.gestures.drawn import DrawnSession, draw_session
-from eitskin_studies.gestures.judged import judge, told_gestures
+from eitskin_studies.gestures.judged import judge, reported_gestures
 from eitskin_studies.gestures.simulated import RATE_HZ, Simulator, TouchedFrame
 
 SESSIONS, FAST_SCENES = 6, 1
@@ -56,12 +56,12 @@ class GestureScene:
                 for one in results
                 if not isinstance(one, FrameError)
             )
-        told = told_gestures(found, Gestures())
+        reported = reported_gestures(found, Gestures())
         zoned = Gestures(ZONES)
         events = [zoned.update(one.touches, one.time_us) for one in found]
 
         def score() -> Score:
-            count = judge(self.session, told)
+            count = judge(self.session, reported)
             return Score(
                 macs=macs, gestures_right=count.right_gestures,
                 gestures_invented=count.invented.total(),

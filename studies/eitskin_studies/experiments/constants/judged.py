@@ -186,7 +186,7 @@ def _set_options(engine: CoreEngine, scene: FrameScene) -> None:
     if scene.track:
         lib.eits_options_track(options)
     for name, value in scene.options.items():
-        choice = CHOICES[name].index(value) if name in CHOICES else value
+        choice = CHOICES[name][value] if name in CHOICES else value
         setattr(options, name, int(choice) if isinstance(choice, bool) else choice)
     status = lib.eits_set_options(context, options)
     if status:

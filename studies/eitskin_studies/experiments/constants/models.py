@@ -10,7 +10,7 @@ from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import decode_model, encode_model
-from eitskin.model.force_law import LoadLaw
+from eitskin.model.force_law import ForceLaw
 from eitskin.model.model import Model
 from eitskin.scene.random_touches import TouchScene, TrueTouch
 from eitskin.teaching.presses import Presses, load_presses
@@ -30,12 +30,12 @@ def of_other_models(maker: SceneMaker, worlds: Sequence[FrameScene]) -> Iterator
     """Scenes of ``worlds`` by models that differ in one thing from the prebuilt one."""
     some = [one for one in worlds if one.kind == "discs_1_to_3"][:4]
     # a gain that reaches 1 + 8 at the rim, where it is kept within MAX_GAIN
-    law = LoadLaw(
+    law = ForceLaw(
         strength=np.array([0, 10], dtype=np.float32), force_n=np.array([0, 5], dtype=np.float32),
         gain=np.array([1, 0, 0, 8, 0, 8], dtype=np.float32), order=2, radius_mm=80.0, reach=1.0,
         uncertainty=0.1,
     )  # fmt: skip
-    calibrated = encode_model(replace(maker.model, load=law))
+    calibrated = encode_model(replace(maker.model, force_law=law))
     for one in some:
         yield replace(one, kind="forces", blob=calibrated)
     for part in (0.5, 0.1, 1e-3):

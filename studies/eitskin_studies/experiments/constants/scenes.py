@@ -103,7 +103,7 @@ class SceneMaker:
                 if made.world.sign is not None:
                     options["sign"] = made.world.sign
                 yield self._scene(
-                    name, scene.name, tare_v=made.quiet_v[k][-TARE_FRAMES:],
+                    name, scene.name, tare_v=made.untouched_v[k][-TARE_FRAMES:],
                     frames_v=made.frames_v[k][None], truth=(scene,), options=options,
                     clean=name in ("discs_1_to_3", "no_touch"),
                 )  # fmt: skip
@@ -129,8 +129,8 @@ class SceneMaker:
             for snr_db in (60.0, 40.0)[: 1 if number else 2]:
                 for half, lifted in sorted({(one.half, one.lifted) for one in FAULTS}):
                     some = [f for f in FAULTS if (f.half, f.lifted) == (half, lifted)]
-                    told = [(f, None if f.lifted else case.scene) for f in some]
-                    yield self._of_case("faults", case, snr_db, told)
+                    reported = [(f, None if f.lifted else case.scene) for f in some]
+                    yield self._of_case("faults", case, snr_db, reported)
 
     def _case(
         self, maker: CaseMaker, name: str, number: int, scene: TouchScene, *, faults: bool = False
@@ -223,8 +223,8 @@ class SceneMaker:
         assert how.adc_bits is not None
         lsb_v = 2 * span_v / 2**how.adc_bits
         converter = (noise_deviation_v(rest_v, snr_db), lsb_v, span_v, self.seed)
-        quiet_v = np.tile(rest_v, (TARE_FRAMES, 1))
-        tare_v, _ = measure(quiet_v, *converter, f"quiet {name}")
+        untouched_v = np.tile(rest_v, (TARE_FRAMES, 1))
+        tare_v, _ = measure(untouched_v, *converter, f"quiet {name}")
         return tare_v, measure(frames_v, *converter, f"frame {name}")[0]
 
     def _drifting(self, worlds: Sequence[FrameScene]) -> Iterator[FrameScene]:
@@ -285,7 +285,7 @@ def _left_out(worlds: Sequence[FrameScene], protocol: Protocol) -> Iterator[Fram
     """Rows that are masked: one, those of one electrode and of three."""
     pairs = protocol.drive_measure
     for electrodes in ((), (3,), (3, 4), (3, 8, 12)):
-        masked = np.isin(pairs, electrodes).any(axis=1)
+        masked = np.asarray(np.isin(pairs, electrodes).any(axis=1))
         masked[7] = True
         for kind in ("discs_1_to_3", "light_touches", "no_touch"):
             for one in [one for one in worlds if one.kind == kind][:2]:

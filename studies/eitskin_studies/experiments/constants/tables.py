@@ -24,17 +24,29 @@ DELTAS = {
 Effects = Mapping[str, Sequence[Effect]]
 
 
-def tables_of(constants: Sequence[Constant], effects: Effects, commit: str) -> tuple[Table, ...]:
-    """Everything; by module; the most sensitive; those that change nothing."""
+def tables_of(
+    constants: Sequence[Constant],
+    effects: Effects,
+    needed: Mapping[str, Sequence[str]],
+    commit: str,
+) -> tuple[Table, ...]:
+    """Everything; by module; the most sensitive; those that change nothing, with the C tests that
+    need them."""
     return (
         _all(constants, effects, commit), _by_module(constants, effects), _most(constants, effects),
-        _unchanged(constants, effects),
+        _unchanged(constants, effects, needed),
     )  # fmt: skip
 
 
-def changes_nothing(some: Sequence[Effect]) -> bool:
-    """Whether both values leave every bit of every scene."""
-    return not any(one.changed or one.failed for one in some)
+def any_change(effects: Effects, constant: Constant) -> bool:
+    """Whether one of its values changes a bit of a scene, or ends the run."""
+    return any(one.changed or one.failed for one in effects[constant.name])
+
+
+def most_of(constant: Constant) -> float:
+    """What a value must stay below to be ranked: a fraction doubled beyond 1 is none, and says only
+    what happens without its rule."""
+    return 1.0 if 0.5 < constant.value < 1 else float("inf")
 
 
 def harm(one: Effect) -> float:
@@ -74,9 +86,9 @@ def _by_module(constants: Sequence[Constant], effects: Effects) -> Table:
     for module in dict.fromkeys(one.module for one in constants):
         some = [one for one in constants if one.module == module]
         sizes = [one for one in some if one.is_size]
-        tried = [effects[one.name] for one in some if not one.is_size]
-        still = [each for each in tried if changes_nothing(each)]
-        unused = sum(not each[0].used for each in still)
+        tried = [one for one in some if not one.is_size]
+        still = [one for one in tried if not any_change(effects, one)]
+        unused = sum(not effects[one.name][0].used for one in still)
         rows.append(
             (
                 module, str(len(some)), str(sum(one.by_hand for one in some)),
@@ -92,7 +104,11 @@ def _by_module(constants: Sequence[Constant], effects: Effects) -> Table:
 
 def _most(constants: Sequence[Constant], effects: Effects) -> Table:
     """The twenty whose worse value does most harm."""
-    worst = {one.name: max(effects[one.name], key=harm) for one in constants if not one.is_size}
+    worst = {
+        one.name: max((e for e in effects[one.name] if e.value < most_of(one)), key=harm)
+        for one in constants
+        if not one.is_size
+    }
     ranked = sorted(
         (one for one in constants if one.name in worst), key=lambda one: -harm(worst[one.name])
     )
@@ -106,22 +122,29 @@ def _most(constants: Sequence[Constant], effects: Effects) -> Table:
                 f"{one.changed} of {one.used}", _signed(one.change("exact")),
                 _signed(1e3 * one.change("median_mm")), f"{one.change('miou_discs'):+.3f}",
                 _signed(one.change("false_names") + one.change("missing_names")),
-                _signed(one.change("gestures_right")), f"{harm(one):.1f}", f"{harm(other):.1f}",
+                _signed(one.change("gestures_right")), _signed(one.change("gestures_invented")),
+                f"{harm(one):.1f}", f"{harm(other):.1f}",
             )
         )  # fmt: skip
     head = ("constant", "module", "value", "worse value", "scenes changed", "exact frames",
-            "median, um", "MIoU of discs", "wrong diagnostics", "gestures right", "harm, points",
-            "of the other value")  # fmt: skip
+            "median, um", "MIoU of discs", "wrong diagnostics", "gestures right", "invented",
+            "harm, points", "of the other value")  # fmt: skip
     return Table("most", head, tuple(rows))
 
 
-def _unchanged(constants: Sequence[Constant], effects: Effects) -> Table:
+def _unchanged(
+    constants: Sequence[Constant], effects: Effects, needed: Mapping[str, Sequence[str]]
+) -> Table:
     rows = [
-        (f"`{one.name}`", one.module, f"{one.value:g}", str(effects[one.name][0].used))
+        (
+            f"`{one.name}`", one.module, f"{one.value:g}", str(effects[one.name][0].used),
+            ", ".join(name.removesuffix("_f32") for name in needed.get(one.name, ())) or "none",
+        )
         for one in constants
-        if not one.is_size and changes_nothing(effects[one.name])
-    ]
-    return Table("unchanged", ("constant", "module", "value", "scenes that use it"), tuple(rows))
+        if not one.is_size and not any_change(effects, one)
+    ]  # fmt: skip
+    head = ("constant", "module", "value", "scenes that use it", "C tests that fail")
+    return Table("unchanged", head, tuple(rows))
 
 
 def _signed(value: float) -> str:

@@ -20,7 +20,7 @@ from typing import Any
 from eitskin.config import load_toml
 from eitskin.core.engine import WIDTHS
 from eitskin.errors import UsageError
-from eitskin_emulator.core_on_qemu import checkout_root, need_tools
+from eitskin_emulator.core_on_qemu import need_tools
 
 NAME = "constants_core"
 FLAGS = "-std=c11 -O2 -fPIC -w -fno-fast-math -ffp-contract=off -fno-math-errno"
@@ -155,13 +155,12 @@ class Variant:
                 sys.modules[name] = before
 
 
-def build_variant(folder: Path) -> Variant:
-    """Compile the checkout's core into ``folder``.
+def build_variant(folder: Path, root: Path) -> Variant:
+    """Compile the core of the checkout ``root`` into ``folder``.
 
     Raises:
-        UsageError: this is no checkout, there is no compiler, or the sources do not compile.
+        UsageError: there is no compiler, or the sources do not compile.
     """
-    root = checkout_root()
     need_tools("cc")
     constants = constants_of(root)
     sources = write_sources(folder, root, constants)

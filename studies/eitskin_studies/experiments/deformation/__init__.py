@@ -63,9 +63,9 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     finder = Reconstructor(model, blob=blob)
     scores = []
     for name, solved in workspace.progress(list(volts.items()), "reconstructing"):
-        for tare, quiet in (("flat", volts["flat"]["quiet"]), ("fresh", solved["quiet"])):
+        for tare, untouched in (("flat", volts["flat"]["quiet"]), ("fresh", solved["quiet"])):
             facts = {"part": "score", "name": name, "tare": tare, "set": drawn.name}
-            look = partial(_scored, finder, drawn, quiet, solved, seed)
+            look = partial(_scored, finder, drawn, untouched, solved, seed)
             scores.append({"name": name, "tare": tare, **workspace.kept(facts, look)})
     return ExperimentOutcome(
         (_table(scores),),
@@ -81,21 +81,21 @@ def _solved(
     """``quiet`` (m,) and ``frames`` (k, m) in V of the deformed skin; touches move with it."""
     model, mesh, thick = deformed(forward, how), forward.mesh, how.thickness
     scenes = [conductivity_with(mesh, one.touches, sheet) for one in drawn.scenes]
-    quiet = np.full(mesh.n_elements, sheet)
-    volts = np.array([model.voltages(one * thick, contact / thick) for one in (quiet, *scenes)])
+    untouched = np.full(mesh.n_elements, sheet)
+    volts = np.array([model.voltages(one * thick, contact / thick) for one in (untouched, *scenes)])
     return {"quiet": volts[0], "frames": volts[1:]}
 
 
 def _scored(
-    finder: Reconstructor, drawn: TouchSet, quiet: FloatArray, solved: dict[str, Any], seed: int
+    finder: Reconstructor, drawn: TouchSet, untouched: FloatArray, solved: dict[str, Any], seed: int
 ) -> dict[str, Any]:
     """Exact scenes, distances, and touches in frames of nothing."""
     how = converter_for(SNR_DB)
-    span_v = how.adc_headroom * float(np.abs(quiet).max())
+    span_v = how.adc_headroom * float(np.abs(untouched).max())
     lsb_v = 2 * span_v / 2 ** (how.adc_bits or 12)
-    converter = (noise_deviation_v(quiet, SNR_DB), lsb_v, span_v, seed)
+    converter = (noise_deviation_v(untouched, SNR_DB), lsb_v, span_v, seed)
     finder.set_options(noise_floor_v=lsb_v / 12**0.5)
-    finder.tare(measure(np.tile(quiet, (64, 1)), *converter, "quiet deformation")[0])
+    finder.tare(measure(np.tile(untouched, (64, 1)), *converter, "quiet deformation")[0])
     frames = measure(solved["frames"], *converter, "frame deformation")[0]
     nothing = measure(np.tile(solved["quiet"], (UNTOUCHED, 1)), *converter, "untouched")[0]
     matched = [
@@ -110,7 +110,7 @@ def _scored(
         "median_mm": float(np.median(far)) if far else None,
         "p95_mm": float(np.quantile(far, 0.95)) if far else None,
         "untouched": float(np.mean([len(_found(finder, frame)) for frame in nothing])),
-        "changed": float(np.linalg.norm(solved["quiet"] - quiet) / np.linalg.norm(quiet)),
+        "changed": float(np.linalg.norm(solved["quiet"] - untouched) / np.linalg.norm(untouched)),
     }
 
 

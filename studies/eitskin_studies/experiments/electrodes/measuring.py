@@ -159,17 +159,17 @@ class PatternWorkspace:
         )
 
     def frames(self, key: str, case: PatternCase, noise_v: float) -> tuple[FloatArray, FloatArray]:
-        """Quiet frames (q, m) and one a scene (k, m) of a set, with white noise of ``noise_v`` in
-        80 samples and no converter."""
+        """Untouched frames (q, m) and one a scene (k, m) of a set, with white noise of ``noise_v``
+        in 80 samples and no converter."""
         session, scan = self.sessions[key], scan_of(case)
         sigma_v = noise_v * (BASE_SAMPLES / scan.samples) ** 0.5
-        quiet = np.tile(
-            from_transfer(session.exact_quiet_v, scan.protocol), (Measurement.quiet_frames, 1)
+        untouched = np.tile(
+            from_transfer(session.exact_untouched_v, scan.protocol), (Measurement.quiet_frames, 1)
         )
         exact = from_transfer(session.exact_v, scan.protocol)
         role, seed = session.touches.role, session.touches.seed
-        quiet_v, _ = measure(quiet, sigma_v, 0.0, 0.0, seed, f"quiet {role}")
-        return quiet_v, measure(exact, sigma_v, 0.0, 0.0, seed, f"frame {role}")[0]
+        untouched_v, _ = measure(untouched, sigma_v, 0.0, 0.0, seed, f"quiet {role}")
+        return untouched_v, measure(exact, sigma_v, 0.0, 0.0, seed, f"frame {role}")[0]
 
     def measured(self, case: PatternCase, noise_v: float) -> dict[str, Any]:
         """A case in plain values: its scan, its model, and the scores of each set."""

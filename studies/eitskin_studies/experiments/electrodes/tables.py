@@ -94,7 +94,7 @@ def _found(result: Mapping[str, Any]) -> tuple[str, ...]:
     scores, errors = result["scores"], hits_mm(result["scores"]["random"])
     image = summarise(scores["random"]["image"])
     median, p95 = np.quantile(errors, [0.5, 0.95]) if len(errors) else (np.nan, np.nan)
-    told, kmac = resolved_mm(scores), scores["random"]["kmac"]
+    reported, kmac = resolved_mm(scores), scores["random"]["kmac"]
     chosen = result["chosen"]
     return (
         ", ".join(f"{value:g}" for value in chosen.values()),
@@ -105,7 +105,7 @@ def _found(result: Mapping[str, Any]) -> tuple[str, ...]:
         share_text(scores["six"]["exact"]),
         f"{np.mean(scores['six']['false']):.2f}",
         f"{median:.1f} / {p95:.1f}",
-        f"{told:g}" if np.isfinite(told) else f"beyond {PAIR_MM[-1]:g}",
+        f"{reported:g}" if np.isfinite(reported) else f"beyond {PAIR_MM[-1]:g}",
         f"{np.mean(kmac):.0f} / {np.max(kmac):.0f}",
     )
 

@@ -65,11 +65,11 @@ def tuned(
     model: Model,
     image_scorer: metrics.ImageScorer,
     scenes: Sequence[TouchScene],
-    quiet_v: FloatArray,
+    untouched_v: FloatArray,
     frames_v: FloatArray,
 ) -> tuple[Evaluator, ChosenSettings]:
-    """The best of all settings on tuning scenes with their frames, quiet (q, m) and touched (k, m):
-    by the sum of image MIoU, disc MIoU and exactly counted share; the first of equals."""
+    """The best of all settings on tuning scenes with their frames, untouched (q, m) and touched (k,
+    m): by the sum of image MIoU, disc MIoU and exactly counted share; the first of equals."""
     best: tuple[float, Evaluator, ChosenSettings] | None = None
     for regularisation in REGULARISATIONS:
         regularised = with_regularisation(model, regularisation)
@@ -77,7 +77,7 @@ def tuned(
             defaults = replace(model.defaults, lambda_rel=lambda_rel, iterations=iterations)
             evaluator = Evaluator(replace(regularised, defaults=defaults), image_scorer)
             truths = evaluator.truths(scenes)
-            results = reconstruct_many(evaluator.model, frames_v, quiet_v, threads=1)
+            results = reconstruct_many(evaluator.model, frames_v, untouched_v, threads=1)
             curves = miou_curves(
                 image_scorer, np.array([one.image for one in results], dtype=np.float64), truths
             )

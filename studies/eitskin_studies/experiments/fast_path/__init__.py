@@ -312,7 +312,7 @@ def _summary(outcomes: list[Outcome], fault: tuple[str, ...]) -> dict[str, Any]:
     after_ms = [1e3 * (min(each) - FAULT_S) for each in named_s if each]
     return {
         "scenes": len(outcomes),
-        "drives": sum(len(each.told) for each in outcomes),
+        "drives": sum(len(each.reported) for each in outcomes),
         "with_false": sum(each.false > 0 for each in outcomes),
         "false_drives": sum(each.false for each in outcomes),
         "fingers": fingers,

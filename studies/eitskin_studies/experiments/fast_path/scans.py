@@ -16,7 +16,7 @@ from eitskin.scoring.matching import GATE_MM
 ROW_S = 1e-4
 TARE_FRAMES = 64
 STEP = 7  # drives follow by 7: neighbours in time are far apart on the skin
-GRACE_S = 0.03  # a touch that has lifted may be told so long
+GRACE_S = 0.03  # a touch that has lifted may be reported so long
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,15 +52,15 @@ class TrueInTime:
 
 @dataclass(eq=False)
 class Outcome:
-    """What was told of one scene: false touches, of each finger the delay of its first report and
-    the error then (or None), errors by finger, frames counted, and how many were told of after each
-    drive; when a diagnostic was first reported."""
+    """What was reported of one scene: false touches, of each finger the delay of its first report
+    and the error then (or None), errors by finger, frames counted, and how many were reported after
+    each drive; when a diagnostic was first reported."""
 
     false: int = 0
     first: list[tuple[float, float] | None] = field(default_factory=list)
     errors: list[list[float]] = field(default_factory=list)
     frames: Counter[str] = field(default_factory=Counter)
-    told: list[tuple[float, int]] = field(default_factory=list)
+    reported: list[tuple[float, int]] = field(default_factory=list)
     named: dict[str, float] = field(default_factory=dict)
 
 
@@ -107,10 +107,10 @@ class Player:
                 end_s = float(scan.time_s[mine][-1]) + ROW_S
                 middle_s = (float(scan.time_s[mine][0]) + end_s) / 2
                 frame[rows] = volts[mine]
-                told = self.drive(number, volts[mine], middle_s)
+                reported = self.drive(number, volts[mine], middle_s)
                 if number == drives[-1]:
-                    told = self._whole_frame(frame, out, end_s)
-                _score(out, truth, told, middle_s, end_s)
+                    reported = self._whole_frame(frame, out, end_s)
+                _score(out, truth, reported, middle_s, end_s)
         return out
 
     def _whole_frame(self, frame: FloatArray, out: Outcome, end_s: float) -> list[FastTouch]:
@@ -133,15 +133,16 @@ class Player:
 def _score(
     out: Outcome,
     truth: Sequence[TrueInTime],
-    told: Sequence[FastTouch],
-    told_s: float,
+    reported: Sequence[FastTouch],
+    reported_s: float,
     end_s: float,
 ) -> None:
-    out.told.append((told_s, len(told)))
+    out.reported.append((reported_s, len(reported)))
     free = [k for k, one in enumerate(truth) if one.from_s <= end_s <= one.to_s + GRACE_S]
-    for touch in told:
+    for touch in reported:
         away = {
-            k: float(np.hypot(*(truth[k].place(told_s) - (touch.x_mm, touch.y_mm)))) for k in free
+            k: float(np.hypot(*(truth[k].place(reported_s) - (touch.x_mm, touch.y_mm))))
+            for k in free
         }
         k = min(away, key=lambda each: away[each], default=-1)
         if k < 0 or away[k] > GATE_MM:

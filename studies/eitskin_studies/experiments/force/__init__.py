@@ -1,5 +1,5 @@
-"""Loads at four radii, a calibration that makes one load read the same anywhere, and the smallest
-load that is detected."""
+"""Weights at four radii, a calibration that makes one weight read the same anywhere, and the
+smallest weight that is detected."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from eitskin_studies.experiments.force.scenes import PressSet
 
 TITLE = (
-    "Loads at four radii, the calibration that makes one load read the same anywhere, and the"
-    " smallest load (Figs. 9 to 11)"
+    "Weights at four radii, the calibration that makes one weight read the same anywhere, and the"
+    " smallest weight (Figs. 9 to 11)"
 )
 
 SNR_DB, AVERAGED_DB = 60.0, 72.0  # the second is what the mean of sixteen frames at the first has
@@ -51,8 +51,10 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     reported = put("force reported", settings.seed, scenes.spread_rows(places))
     light = put("force light", settings.seed, scenes.light_rows(radius_mm, settings.count(15, 6)))
 
-    told, of_laws = (_read(workspace, instruments, one, SNR_DB) for one in (nominal, uncertain))
-    drawn = curves.curves_of(nominal, told, uncertain, of_laws)
+    nominal_read, of_laws = (
+        _read(workspace, instruments, one, SNR_DB) for one in (nominal, uncertain)
+    )
+    drawn = curves.curves_of(nominal, nominal_read, uncertain, of_laws)
     judged: dict[tuple[str, float], anywhere.Anywhere] = {}
     for snr in workspace.progress(SNRS_DB, "calibrating"):
         on, read = (_read(workspace, instruments, one, snr) for one in (tuned, reported))
@@ -69,17 +71,17 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             judged[name, snr] = anywhere.Anywhere.from_dict(
                 workspace.kept(facts, partial(_as_dict, scored))
             )
-    reps, quiet = settings.count(30, 4), settings.count(4000, 80)
+    reps, untouched = settings.count(30, 4), settings.count(4000, 80)
     found = []
     for snr in workspace.progress(detection.SNRS_DB, "light presses"):
         facts = {
             "part": "detection",
             "snr_db": snr,
             "reps": reps,
-            "quiet": quiet,
+            "quiet": untouched,
             "set": light.facts,
         }
-        look = partial(detection.detect, instruments, light, snr, reps, quiet)
+        look = partial(detection.detect, instruments, light, snr, reps, untouched)
         found.append(
             detection.Detection.from_dict(
                 workspace.kept(facts, lambda look=look: look().as_dict())  # type: ignore[misc]

@@ -1,5 +1,5 @@
-"""One load, anywhere: how readings of a load scatter over the skin, raw and after the calibration
-of ``eitskin calibrate``."""
+"""One weight, anywhere: how readings of a weight scatter over the skin, raw and after the
+calibration of ``eitskin calibrate``."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +11,7 @@ from eitskin.calibration.fit import calibrate
 from eitskin.calibration.presses import WeighedPresses
 from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin_studies.experiments.experiment import Table
-from eitskin_studies.experiments.force.law import LOADS_G
+from eitskin_studies.experiments.force.law import WEIGHTS_G
 from eitskin_studies.experiments.force.readouts import LOG_TOUCH, READOUTS, TOUCH, Readout
 from eitskin_studies.experiments.force.scenes import PressSet
 
@@ -23,9 +23,9 @@ class Anywhere:
     """One readout at one SNR, on places that nothing was tuned on.
 
     Attributes:
-        raw: readings over their load's mean, less 1: (places, loads); NaN where the press was not
-            found.
-        calibrated: loads over the true ones, less 1; likewise.
+        raw: readings over the mean of their weight, less 1: (places, weights); NaN where the press
+            was not found.
+        calibrated: forces over the true ones, less 1; likewise.
         order, form: of the gain and the law that leaving places out chose on the tuning places.
         found: share of the presses that were.
         macs: of a frame.
@@ -72,17 +72,17 @@ def scored(
     )
     found = calibrate(presses, radius_mm, resamples=0)
     there = np.isfinite(read.value) & (read.value > 0)
-    loads = np.full(len(read.value), np.nan)
-    loads[there] = found.law.forces_at(read.place_mm[there], read.value[there]) / NEWTONS_PER_GRAM
-    values = np.where(there, read.value, np.nan).reshape(-1, len(LOADS_G))
+    forces = np.full(len(read.value), np.nan)
+    forces[there] = found.law.forces_at(read.place_mm[there], read.value[there]) / NEWTONS_PER_GRAM
+    values = np.where(there, read.value, np.nan).reshape(-1, len(WEIGHTS_G))
     raw = values / np.nanmean(values, axis=0) - 1
-    off = (loads / reported.grams - 1).reshape(raw.shape)
+    off = (forces / reported.grams - 1).reshape(raw.shape)
     return Anywhere(raw, off, found.fitted.order, found.fitted.form, float(there.mean()), read.macs)
 
 
 def scatter(errors: FloatArray) -> float:
-    """Relative standard deviation over places, pooled over loads, each around its own mean; of
-    errors (places, loads)."""
+    """Relative standard deviation over places, pooled over weights, each around its own mean; of
+    errors (places, weights)."""
     return float(
         np.sqrt(
             np.nanmean(np.nanvar(errors, axis=0, ddof=1) / (1 + np.nanmean(errors, axis=0)) ** 2)
@@ -123,12 +123,12 @@ def table_of(results: dict[tuple[str, float], Anywhere], snrs_db: tuple[float, f
 
 
 def by_load(results: dict[tuple[str, float], Anywhere], snrs_db: tuple[float, float]) -> Table:
-    """The touch's calibrated load, weight by weight: scatter, bias, mean of worst 10 %."""
+    """The touch's calibrated force, weight by weight: scatter, bias, mean of worst 10 %."""
     rows = []
     for name in (TOUCH, LOG_TOUCH):
         for snr in snrs_db:
             errors = results[name, snr].calibrated
-            for k, grams in enumerate(LOADS_G):
+            for k, grams in enumerate(WEIGHTS_G):
                 one = errors[:, k][np.isfinite(errors[:, k])]
                 tenth = np.sort(np.abs(one))[-max(1, -(-len(one) // 10)) :]
                 cells = (

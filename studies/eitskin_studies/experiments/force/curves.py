@@ -1,4 +1,4 @@
-"""Readings over load at four radii: slopes, how straight they are, and how far the law's
+"""Readings over weight at four radii: slopes, how straight they are, and how far the law's
 uncertainty moves them."""
 
 from dataclasses import dataclass
@@ -7,22 +7,22 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin_studies.experiments.experiment import Table
-from eitskin_studies.experiments.force.law import LOADS_G
+from eitskin_studies.experiments.force.law import WEIGHTS_G
 from eitskin_studies.experiments.force.readouts import READOUTS, Readout
 from eitskin_studies.experiments.force.scenes import RADIUS_SHARES, PressSet
 
 
 @dataclass(frozen=True, eq=False)
 class ForceCurves:
-    """One readout: ``mean`` (radii, loads) over angles under the nominal law; ``bands`` (laws,
-    radii, loads) under others."""
+    """One readout: ``mean`` (radii, weights) over angles under the nominal law; ``bands`` (laws,
+    radii, weights) under others."""
 
     mean: FloatArray
     bands: FloatArray
 
     @property
     def slopes(self) -> FloatArray:
-        """(radii,) of the straight line through the loads, a g."""
+        """(radii,) of the straight line through the weights, a g."""
         return slopes_of(self.mean)
 
     def centre_share_band(self) -> tuple[float, float]:
@@ -33,19 +33,19 @@ class ForceCurves:
 
     def straightness(self) -> tuple[float, float]:
         """Least R^2 over the radii; and the greatest distance from the line, relative to the
-        reading at the greatest load."""
-        loads = np.array(LOADS_G)
+        reading at the greatest weight."""
+        weights = np.array(WEIGHTS_G)
         r2, off = [], []
         for values in self.mean:
-            line = np.polyval(np.polyfit(loads, values, 1), loads)
+            line = np.polyval(np.polyfit(weights, values, 1), weights)
             r2.append(1 - ((values - line) ** 2).sum() / ((values - values.mean()) ** 2).sum())
             off.append(np.abs(values - line).max() / abs(values[-1]))
         return float(np.nanmin(r2)), float(np.nanmax(off))
 
 
 def slopes_of(values: FloatArray) -> FloatArray:
-    """Slopes (radii,) of readings (radii, loads)."""
-    return np.asarray(np.polyfit(LOADS_G, values.T, 1)[0])
+    """Slopes (radii,) of readings (radii, weights)."""
+    return np.asarray(np.polyfit(WEIGHTS_G, values.T, 1)[0])
 
 
 def curves_of(
@@ -58,11 +58,11 @@ def curves_of(
         mean = [
             [
                 np.nanmean(read[name].value[(nominal.group == radius) & (nominal.grams == grams)])
-                for grams in LOADS_G
+                for grams in WEIGHTS_G
             ]
             for radius in range(len(RADIUS_SHARES))
         ]
-        at_one_angle = of_laws[name].value.reshape(-1, len(RADIUS_SHARES), len(LOADS_G))
+        at_one_angle = of_laws[name].value.reshape(-1, len(RADIUS_SHARES), len(WEIGHTS_G))
         found[name] = ForceCurves(
             np.array(mean), np.array(mean) * at_one_angle[1:] / at_one_angle[0]
         )

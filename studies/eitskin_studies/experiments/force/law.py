@@ -23,7 +23,7 @@ from eitskin.scene.laws import Piezoresistive
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.streams import stream
 
-LOADS_G = (50.0, 80.0, 100.0, 150.0, 200.0)
+WEIGHTS_G = (50.0, 80.0, 100.0, 150.0, 200.0)
 DEVIATION = {"modulus_pa": 0.25, "tip_mm": 0.1, "sensitivity_per_gram": 0.2, "saturation": 0.2}
 
 
@@ -74,7 +74,7 @@ class SheetLaw(PressLaw):
 
     def contrast(self, grams: float) -> float:
         """That of a round tip's 50 g, by pressure."""
-        tip = LOADS_G[0] * self.pressure_kpa(grams) / NOMINAL.pressure_kpa(LOADS_G[0])
+        tip = WEIGHTS_G[0] * self.pressure_kpa(grams) / NOMINAL.pressure_kpa(WEIGHTS_G[0])
         return super().contrast(tip)
 
 

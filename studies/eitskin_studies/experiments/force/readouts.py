@@ -64,19 +64,19 @@ class Instruments:
         """Of the image: what ``eitskin calibrate`` measures places by."""
         return float(np.hypot(*self.linear.grid.centres_mm().T).max())
 
-    def batch(self, kind: str, quiet_v: FloatArray) -> Batch:
+    def batch(self, kind: str, untouched_v: FloatArray) -> Batch:
         """The core with a reference."""
         batch = Batch(self.models[kind], threads=1)
-        batch.tare(quiet_v)
+        batch.tare(untouched_v)
         return batch
 
     def read(self, session: FrameSession, snr_db: float) -> dict[str, Readout]:
         """Every readout of every frame of ``session`` at ``snr_db``."""
         measured = session.measured(snr_db)
-        frames, quiet = measured.frames_v[:, -1], measured.quiet_v
+        frames, untouched = measured.frames_v[:, -1], measured.untouched_v
         centres, area = self.linear.grid.centres_mm(), self.linear.grid.pixel_mm**2
         fista = PlainFista(self.linear.jacobian, FISTA_ITERATIONS, FISTA_RATIO, signed=True)
-        plain = fista.reconstruct(frames - quiet.mean(axis=0))
+        plain = fista.reconstruct(frames - untouched.mean(axis=0))
         peaks = centres[np.abs(plain).argmax(axis=1)]
         found = {
             PEAK: Readout(plain.max(axis=1), peaks, 0.0),
@@ -88,7 +88,7 @@ class Instruments:
         ):
             results = [
                 result
-                for result in self.batch(kind, quiet).each(frames)
+                for result in self.batch(kind, untouched).each(frames)
                 if isinstance(result, Reconstruction)
             ]
             assert len(results) == len(frames)

@@ -13,7 +13,7 @@ from eitskin.arrays import FloatArray, IntArray
 from eitskin.scene.random_touches import TouchScene, TouchSet
 from eitskin.scene.streams import stream
 from eitskin_studies.experiments.experiment import Workspace
-from eitskin_studies.experiments.force.law import LOADS_G, NOMINAL, PressLaw
+from eitskin_studies.experiments.force.law import NOMINAL, WEIGHTS_G, PressLaw
 from eitskin_studies.harness.sessions import FrameSession, SceneSolver
 
 RADIUS_SHARES = (0.0, 0.3, 0.6, 0.85)  # of the skin's radius: from the centre to near the rim
@@ -23,7 +23,7 @@ ANGLES_DEG = (
     258.0,
 )  # at different distances from electrodes, which are 22.5 degrees apart
 OUTERMOST = 0.87  # of the radius: weights are put no nearer to the rim
-LIGHT_G = (0.4, 120.0)  # least and greatest of the light loads
+LIGHT_G = (0.4, 120.0)  # least and greatest of the light weights
 SHEET_SHARES = (0.0, 0.28, 0.56, 0.84)  # at equal distances from the centre to the boundary
 SHEET_G = (2.0, 209.0)  # under the sheet; the greatest presses with what the gel stands
 AT_ONCE = 20
@@ -92,7 +92,7 @@ def solved(
         solver.skin.conductivity_s_per_m,
         whole,
         np.concatenate(volts),
-        part.exact_quiet_v,
+        part.exact_untouched_v,
     )
     grams, places, law, group = zip(*rows, strict=True)
     return PressSet(session, np.array(grams), np.array(places), np.array(law), np.array(group))
@@ -112,11 +112,11 @@ def radius_places(
 def curve_rows(
     radius_mm: float, shares: Sequence[float] = RADIUS_SHARES
 ) -> list[tuple[float, tuple[float, float], int, int]]:
-    """Each of the paper's loads at the four radii, at three angles."""
+    """Each of the paper's weights at the four radii, at three angles."""
     return [
         (grams, place, 0, number)
         for place, number in radius_places(radius_mm, ANGLES_DEG, shares)
-        for grams in LOADS_G
+        for grams in WEIGHTS_G
     ]
 
 
@@ -127,14 +127,16 @@ def law_rows(radius_mm: float, laws: int) -> list[tuple[float, tuple[float, floa
         (grams, place, law, number)
         for law in range(laws)
         for place, number in places
-        for grams in LOADS_G
+        for grams in WEIGHTS_G
     ]
 
 
 def spread_rows(places: FloatArray) -> list[tuple[float, tuple[float, float], int, int]]:
-    """Every load at each of ``places``."""
+    """Every weight at each of ``places``."""
     return [
-        (grams, (float(x), float(y)), 0, k) for k, (x, y) in enumerate(places) for grams in LOADS_G
+        (grams, (float(x), float(y)), 0, k)
+        for k, (x, y) in enumerate(places)
+        for grams in WEIGHTS_G
     ]
 
 
@@ -144,6 +146,6 @@ def light_rows(
     shares: Sequence[float] = RADIUS_SHARES,
     loads_g: tuple[float, float] = LIGHT_G,
 ) -> list[tuple[float, tuple[float, float], int, int]]:
-    """A ladder of ``count`` loads by equal factors at the four radii, at two angles."""
+    """A ladder of ``count`` weights by equal factors at the four radii, at two angles."""
     places, ladder = radius_places(radius_mm, ANGLES_DEG[:2], shares), np.geomspace(*loads_g, count)
     return [(float(grams), place, 0, number) for place, number in places for grams in ladder]

@@ -13,7 +13,7 @@ from eitskin_studies.experiments.experiment import Table, Workspace
 from eitskin_studies.experiments.force import scenes
 from eitskin_studies.experiments.force.curves import slopes_of
 from eitskin_studies.experiments.force.detection import Detection, detect
-from eitskin_studies.experiments.force.law import GEL_LIMIT_KPA, LOADS_G, NOMINAL, SHEET
+from eitskin_studies.experiments.force.law import GEL_LIMIT_KPA, NOMINAL, SHEET, WEIGHTS_G
 from eitskin_studies.experiments.force.readouts import (
     READOUTS,
     Instruments,
@@ -53,9 +53,9 @@ class UnderSheet:
         rows = []
         for name, values in self.reading.items():
             slopes = slopes_of(np.array(values))
-            line = [np.polyval(np.polyfit(LOADS_G, one, 1), LOADS_G) for one in values]
+            line = [np.polyval(np.polyfit(WEIGHTS_G, one, 1), WEIGHTS_G) for one in values]
             off = np.array(values) - line
-            r2 = 1 - (off**2).sum(axis=1) / np.var(values, axis=1) / len(LOADS_G)
+            r2 = 1 - (off**2).sum(axis=1) / np.var(values, axis=1) / len(WEIGHTS_G)
             rising = "yes" if (np.diff(slopes) > 0).all() else "no"
             relative = (f"{slope / slopes[-1]:.2f}" for slope in slopes)
             rows.append((name, *relative, rising, f"{r2.min():.3f}"))
@@ -73,7 +73,7 @@ class UnderSheet:
                 ]
                 alarms = [
                     f"{self.least[contact, snr, mean_of].false} of"
-                    f" {self.least[contact, snr, mean_of].quiet}"
+                    f" {self.least[contact, snr, mean_of].untouched}"
                     for contact in ("sheet", "tip")
                 ]
                 rows.append((f"{snr:g} dB", what, *cells, "; ".join(alarms)))
@@ -121,14 +121,14 @@ def measured(
     least: dict[tuple[str, float, int], Detection] = {
         ("tip", one.snr_db, 1): one for one in tip_single
     }
-    reps, quiet = settings.count(30, 4), settings.count(4000, 80)
+    reps, untouched = settings.count(30, 4), settings.count(4000, 80)
     wanted = [(snr, mean_of) for snr in SNRS_DB for mean_of in (1, SECOND)]
     wanted += [(SNRS_DB[-1], mean_of) for mean_of in MEANS[1:-1]]
     for snr, mean_of in workspace.progress(wanted, "weights on a sheet"):
         for contact, presses in (("sheet", light), ("tip", tip)):
             if (contact, snr, mean_of) in least:
                 continue
-            still = quiet if mean_of == 1 else max(80, quiet // 8)
+            still = untouched if mean_of == 1 else max(80, untouched // 8)
             what = {"part": "mean", "mean_of": mean_of, "reps": reps, "quiet": still}
             look = partial(detect, instruments, presses, snr, reps, still, mean_of)
             one = workspace.kept(
@@ -147,7 +147,7 @@ def _by_place(curve: scenes.PressSet, read: Readout) -> list[list[float]]:
     return [
         [
             float(np.nanmean(read.value[(curve.group == place) & (curve.grams == grams)]))
-            for grams in LOADS_G
+            for grams in WEIGHTS_G
         ]
         for place in range(len(scenes.SHEET_SHARES))
     ]
@@ -157,12 +157,12 @@ def pressures() -> str:
     """Of the two contacts, in words."""
 
     def of(law: Any) -> str:
-        first, last = (law.pressure_kpa(grams) for grams in (LOADS_G[0], LOADS_G[-1]))
-        low, high = (law.contrast(grams) for grams in (LOADS_G[0], LOADS_G[-1]))
+        first, last = (law.pressure_kpa(grams) for grams in (WEIGHTS_G[0], WEIGHTS_G[-1]))
+        low, high = (law.contrast(grams) for grams in (WEIGHTS_G[0], WEIGHTS_G[-1]))
         return f"{first:.1f} to {last:.1f} kPa, contrast {low:.2f} to {high:.2f}"
 
     return (
-        f"From {LOADS_G[0]:g} to {LOADS_G[-1]:g} g the sheet of {SHEET.sheet_mm:g} mm radius"
+        f"From {WEIGHTS_G[0]:g} to {WEIGHTS_G[-1]:g} g the sheet of {SHEET.sheet_mm:g} mm radius"
         f" presses with {of(SHEET)}, the round tip with {of(NOMINAL)}; the paper's gel stands"
         f" {GEL_LIMIT_KPA:g} kPa."
     )

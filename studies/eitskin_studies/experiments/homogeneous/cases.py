@@ -15,7 +15,7 @@ from eitskin.scene.session import MeshCache
 from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import Skin
 
-QUIET_FRAMES, SNR_DB, BITS, HEADROOM = 32, 60.0, 12, 1.25
+UNTOUCHED_FRAMES, SNR_DB, BITS, HEADROOM = 32, 60.0, 12, 1.25
 ELECTRODES = 16
 CONTACTS: dict[str, Any] = {"contact_impedance": {"spread": 0.2}}
 MEASURED: dict[str, Any] = {
@@ -106,8 +106,8 @@ CASES = (
 def examined(
     case: TankCase, skin: Skin, seed: int, electrode: int, elements: int, mesh_cache: MeshCache
 ) -> dict[str, Any]:
-    """A session of the untouched ``skin``: its mean quiet frame "reference_v", and what the doctor
-    finds, in JSON values.
+    """A session of the untouched ``skin``: its mean untouched frame "reference_v", and what the
+    doctor finds, in JSON values.
 
     Raises:
         ConfigError, GeometryError, MissingExtraError: from the scene.
@@ -118,7 +118,7 @@ def examined(
         protocol=case.scan(electrode),
         effects=case.effects_at(electrode),
         seed=seed,
-        quiet_frames=QUIET_FRAMES if case.effects else 1,
+        quiet_frames=UNTOUCHED_FRAMES if case.effects else 1,
         elements=elements,
         where="study homogeneous",
     )

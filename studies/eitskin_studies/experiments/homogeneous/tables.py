@@ -9,7 +9,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin_studies.experiments.experiment import ExperimentSettings, Table
-from eitskin_studies.experiments.homogeneous.cases import INSTRUMENT, QUIET_FRAMES
+from eitskin_studies.experiments.homogeneous.cases import INSTRUMENT, UNTOUCHED_FRAMES
 from eitskin_studies.experiments.homogeneous.measured import FILE, SOURCE
 from eitskin_studies.experiments.homogeneous.uniformity import Uniformity
 from eitskin_studies.harness.summary import summarise
@@ -30,7 +30,7 @@ class Row:
     """A case in all its sessions.
 
     Attributes:
-        folded_v: (s, drives, positions) mean quiet frames in V.
+        folded_v: (s, drives, positions) mean untouched frames in V.
         uniformities: of each session.
         findings: (name, severity) of each session.
         measured: the doctor's numbers of each session.
@@ -92,8 +92,8 @@ def words(
     conditions = (
         f"{sessions} sessions a case (one without any effect), seeds {seed} to"
         f" {seed + sessions - 1}, each with contacts, places, gains and noise of its own; means of"
-        f" {QUIET_FRAMES} frames. In percent; from the third case on: what the second has, and the"
-        " one thing named."
+        f" {UNTOUCHED_FRAMES} frames. In percent; from the third case on: what the second has, and"
+        " the one thing named."
     )
     reading = (
         f"An instrument with nothing wrong has a spread of {np.mean(usual.values('spread')):.2f} %."
@@ -137,12 +137,12 @@ def _interval(values: Sequence[float]) -> str:
 
 
 def _doctors_numbers(row: Row) -> str:
-    told = []
+    reported = []
     for key, form in (
         ("gain_spread", "{:.1%}"),
         ("reciprocity_rms", "{:.2%}"),
         ("snr_db", "{:.1f} dB"),
     ):
         values = [one[key] for one in row.measured if one.get(key) is not None]
-        told.append(form.format(float(np.median(values))).replace("%", " %") if values else "-")
-    return ", ".join(told)
+        reported.append(form.format(float(np.median(values))).replace("%", " %") if values else "-")
+    return ", ".join(reported)

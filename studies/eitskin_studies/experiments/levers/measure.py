@@ -122,7 +122,7 @@ class AblationRuns:
         model, measured = self.model(ablation), session.measured(snr_db)
         options = replace(default_options(model), **ablation.options)
         return list(
-            reconstruct_many(model, measured.frames_v[:, -1], measured.quiet_v, options=options)
+            reconstruct_many(model, measured.frames_v[:, -1], measured.untouched_v, options=options)
         )
 
     def _curves(

@@ -1,7 +1,7 @@
 """The honest "cannot tell": how well ``crowded`` is calibrated, and a linear score that may do
 better.
 
-The score is w . f + b with features that the core has at hand without a logarithm or an
+The score is w . f + b with features that the core can compute without a logarithm or an
 exponential; it is fitted as a logistic regression (Cox 1958) on tuning scenes to whether a frame is
 *exact* (every touch within 10 mm, and nothing else).
 """

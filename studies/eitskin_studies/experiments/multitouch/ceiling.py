@@ -33,8 +33,8 @@ MIN_RADIUS_MM, MAX_RADIUS_MM = 1.0, 30.0
 CLEAR_DEVIATIONS = 3.0
 
 
-class Told(OracleEngine):
-    """The oracle, whose fit starts at the places that it is told."""
+class GivenPlaces(OracleEngine):
+    """The oracle, whose fit starts at the places that it is given."""
 
     def __init__(self, model: Model) -> None:
         super().__init__(model)
@@ -48,8 +48,8 @@ class Told(OracleEngine):
 
 def core_told(model: Model, measured: MeasuredFrames, scenes: Sequence[TouchScene]) -> list[bool]:
     """Whether the fit that begins at the truth is exact, for each scene."""
-    engine = Told(model)
-    engine.set_reference(measured.quiet_v)
+    engine = GivenPlaces(model)
+    engine.set_reference(measured.untouched_v)
     exact = []
     for frame_v, scene in zip(measured.frames_v[:, -1], scenes, strict=True):
         engine.forget()
@@ -78,18 +78,18 @@ class Truthful:
         self._mesh = mesh_for_elements(skin, ELEMENTS)
         self._forward, self._cover = ForwardModel(self._mesh, skin, protocol), Cover(self._mesh)
         self._sheet = skin.conductivity_s_per_m
-        self._quiet_v = self._forward.voltages(self._sheet)
+        self._untouched_v = self._forward.voltages(self._sheet)
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
 
     def fit(
-        self, frame_v: FloatArray, quiet_v: FloatArray, noise_v: float, scene: TouchScene
+        self, frame_v: FloatArray, untouched_v: FloatArray, noise_v: float, scene: TouchScene
     ) -> FittedDiscs:
         """From the true places on. Rows are scaled to this mesh's own V0, which takes contacts and
         mesh out to first order."""
         from scipy.optimize import least_squares
 
         contrasts = [touch.contrast for touch in scene.touches]
-        target = frame_v * self._quiet_v / quiet_v
+        target = frame_v * self._untouched_v / untouched_v
         begin = np.array([(t.x_mm, t.y_mm, t.radius_mm) for t in scene.touches]).ravel()
         low = np.tile([-np.inf, -np.inf, MIN_RADIUS_MM], len(contrasts))
         high = np.tile([np.inf, np.inf, MAX_RADIUS_MM], len(contrasts))
@@ -166,7 +166,7 @@ class Truthful:
         return change
 
 
-def quiet_mean(measured: MeasuredFrames) -> FloatArray:
+def untouched_mean(measured: MeasuredFrames) -> FloatArray:
     """(m,) V."""
-    mean = np.asarray(measured.quiet_v.mean(axis=0))
+    mean = np.asarray(measured.untouched_v.mean(axis=0))
     return np.where(np.abs(mean) > 0, mean, math.inf)

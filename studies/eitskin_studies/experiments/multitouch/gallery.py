@@ -66,7 +66,7 @@ def gallery(touch_data: TouchData, workspace: Workspace) -> list[Example]:
             solver = Reconstructor(
                 model, options=replace(default_options(model), **VARIANTS[0].options)
             )
-            solver.tare(measured.quiet_v)
+            solver.tare(measured.untouched_v)
             result = solver.reconstruct(measured.frames_v[SCENE, -1])
             method, frame = (
                 touch_data.method(CLASSICAL[0]),

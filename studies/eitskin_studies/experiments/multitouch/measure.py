@@ -140,13 +140,13 @@ def limits(touch_data: TouchData, workspace: Workspace) -> list[Limit]:
 def _limit(touch_data: TouchData, cell: Cell, snr_db: float, count: int) -> Limit:
     session, fits = touch_data.session(cell), ceiling.Truthful(touch_data.skin, touch_data.protocol)
     scenes, whole = session.touches.scenes[:count], session.measured(snr_db)
-    measured = MeasuredFrames(whole.quiet_v, whole.frames_v[: len(scenes)])
-    quiet_v, noise_v = (
-        ceiling.quiet_mean(measured),
-        noise_deviation_v(session.exact_quiet_v, snr_db),
+    measured = MeasuredFrames(whole.untouched_v, whole.frames_v[: len(scenes)])
+    untouched_v, noise_v = (
+        ceiling.untouched_mean(measured),
+        noise_deviation_v(session.exact_untouched_v, snr_db),
     )
     fitted = [
-        fits.fit(f, quiet_v, noise_v, s)
+        fits.fit(f, untouched_v, noise_v, s)
         for f, s in zip(measured.frames_v[:, -1], scenes, strict=True)
     ]
     core, told = {}, {}

@@ -83,7 +83,7 @@ def solve(model: Model, variant: TouchVariant, measured: MeasuredFrames) -> list
     from dataclasses import replace
 
     batch = Batch(model, threads=1, options=replace(default_options(model), **variant.options))
-    batch.tare(measured.quiet_v)
+    batch.tare(measured.untouched_v)
     seen = []
     for result in batch.each(measured.frames_v[:, -1]):
         if isinstance(result, FrameError):
@@ -115,8 +115,8 @@ class TrainedMethod:
 
 
 def differences_v(measured: MeasuredFrames) -> FloatArray:
-    """Frames less the mean of the quiet ones, (k, m)."""
-    return np.asarray(measured.frames_v[:, -1] - measured.quiet_v.mean(axis=0))
+    """Frames less the mean of the untouched ones, (k, m)."""
+    return np.asarray(measured.frames_v[:, -1] - measured.untouched_v.mean(axis=0))
 
 
 def train(

@@ -103,7 +103,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
 def _first_wrong(finder: CoreFinder, of: WorldScenes) -> dict[str, Any]:
     """The first scene that is not exact, or the last: true touches' rims and found discs."""
     example: dict[str, Any] = {}
-    for scene, *measured in zip(of.scenes, of.quiet_v, of.frames_v, of.step_v, strict=True):
+    for scene, *measured in zip(of.scenes, of.untouched_v, of.frames_v, of.step_v, strict=True):
         try:
             found = finder(*measured)
         except FrameError:

@@ -34,7 +34,7 @@ def ellipses_of(finder: CoreFinder, of: WorldScenes) -> dict[str, Any]:
     ellipse: its angle off in degrees, its aspect over the true one less 1, and its IoU with the
     true touch as a disc and as an ellipse."""
     matched, said = 0, []
-    for scene, *measured in zip(of.scenes, of.quiet_v, of.frames_v, of.step_v, strict=True):
+    for scene, *measured in zip(of.scenes, of.untouched_v, of.frames_v, of.step_v, strict=True):
         try:
             found = finder(*measured)
         except FrameError:

@@ -114,7 +114,7 @@ def _scenes(places: list[list[float]], role: str) -> list[TouchScene]:
 def _by_core(core: Reconstructor, session: FrameSession, snr_db: float) -> list[list[bool]]:
     """For each noise, whether the scenes are exact."""
     measured = session.measured(snr_db, held=NOISES)
-    core.tare(measured.quiet_v)
+    core.tare(measured.untouched_v)
     found: list[list[bool]] = []
     for frames in np.moveaxis(measured.frames_v, 1, 0):
         found.append([])
@@ -127,7 +127,7 @@ def _by_core(core: Reconstructor, session: FrameSession, snr_db: float) -> list[
 
 def _by_images(see: Any, session: FrameSession) -> list[list[bool]]:
     measured = session.measured(CLASSICAL_DB, held=NOISES)
-    differences = measured.frames_v - measured.quiet_v.mean(axis=0)
+    differences = measured.frames_v - measured.untouched_v.mean(axis=0)
     return [
         [
             _exact(scene, places)
@@ -147,8 +147,10 @@ def _table(exact: dict[tuple[str, str], list[list[bool]]]) -> Table:
     for k in range(MOST):
         cells = []
         for column in columns:
-            told = [frame[k] for frame in exact[column] if k < len(frame)]
-            cells.append(f"{100 * share(sum(told), len(told)).mean:.0f}" if told else "-")
+            reported = [frame[k] for frame in exact[column] if k < len(frame)]
+            cells.append(
+                f"{100 * share(sum(reported), len(reported)).mean:.0f}" if reported else "-"
+            )
         rows.append((str(k + 1), *cells))
     short = {name: name.split(" 6 mm")[0] for name in READINGS}
     head = ("weights", *(f"{short[name]}: {what}" for name, what in columns))

@@ -123,13 +123,13 @@ class Maker:
     def _threshold(self) -> float:
         measured = self.session(self.tuning).measured(SNR_DB)
         return self.evaluator.threshold(
-            self.tuning.scenes, measured.quiet_v, measured.frames_v[:, -1]
+            self.tuning.scenes, measured.untouched_v, measured.frames_v[:, -1]
         )
 
     def _scores(self, t: float) -> dict[str, Any]:
         measured = self.session(self.test).measured(SNR_DB)
         return self.evaluator.scores(
-            self.test.scenes, measured.quiet_v, measured.frames_v[:, -1], t
+            self.test.scenes, measured.untouched_v, measured.frames_v[:, -1], t
         )
 
     def _about(self) -> dict[str, Any]:
@@ -146,10 +146,10 @@ class Maker:
         chosen = max(range(len(scenes)), key=lambda k: self._variety(scenes[k]))
         measured = session.measured(SNR_DB)
         one = reconstruct_many(
-            model, measured.frames_v[chosen : chosen + 1, -1], measured.quiet_v, threads=1
+            model, measured.frames_v[chosen : chosen + 1, -1], measured.untouched_v, threads=1
         )[0]
         return {
-            "rms_v0_mv": 1e3 * float(np.sqrt(np.mean(session.exact_quiet_v**2))),
+            "rms_v0_mv": 1e3 * float(np.sqrt(np.mean(session.exact_untouched_v**2))),
             "pixels": model.grid.n_pixels,
             "pixel_mm": model.grid.pixel_mm,
             "rank": model.rank,

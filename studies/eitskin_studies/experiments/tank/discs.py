@@ -70,7 +70,7 @@ def _variant(
         )
     imager = CoreImager(tank, Levers(kind=KIND), painted=True, options=options)
     frames, chosen = evaluation_sets.phantoms, touch_like(evaluation_sets.phantoms)
-    tuned = imager.show(evaluation_sets.metal.quiet_v, evaluation_sets.metal.frames_v, signed)
+    tuned = imager.show(evaluation_sets.metal.untouched_v, evaluation_sets.metal.frames_v, signed)
     shown = imager.show(frames.reference_voltage_v, frames.voltage_v[chosen], signed)
     truth = truth_of(frames, evaluation_sets.image_scorer.raster)[0][chosen]
     at_tuned = match_all(

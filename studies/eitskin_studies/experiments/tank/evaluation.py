@@ -56,7 +56,9 @@ def evaluate(entry: Entry, evaluation_sets: EvaluationSets) -> dict[str, Any]:
     best: tuple[float, float, Imager, FloatArray, Shown] | None = None
     for value in entry.values:
         imager = entry.make(value)
-        shown = imager.show(evaluation_sets.metal.quiet_v, evaluation_sets.metal.frames_v, False)
+        shown = imager.show(
+            evaluation_sets.metal.untouched_v, evaluation_sets.metal.frames_v, False
+        )
         curves = curves_of(shown, evaluation_sets.metal.conductive, evaluation_sets.image_scorer)
         score = float(curves.mean(axis=0).max())
         if best is None or score > best[0] + 1e-12:
@@ -65,7 +67,7 @@ def evaluate(entry: Entry, evaluation_sets: EvaluationSets) -> dict[str, Any]:
     trained, value, imager, curves, metal = best
     threshold = best_threshold(curves)
     at = THRESHOLDS.index(threshold)
-    test = imager.show(evaluation_sets.test.quiet_v, evaluation_sets.test.frames_v, False)
+    test = imager.show(evaluation_sets.test.untouched_v, evaluation_sets.test.frames_v, False)
     test_curves = curves_of(test, evaluation_sets.test.conductive, evaluation_sets.image_scorer)
     chosen = touch_like(evaluation_sets.phantoms)
     frames = evaluation_sets.phantoms.voltage_v[chosen]
@@ -158,7 +160,7 @@ def _both_signs(
 ) -> dict[str, Any]:
     """All nine frames and the rods, with both signs."""
     mixed, frames = evaluation_sets.mixed, evaluation_sets.phantoms
-    tuned = imager.show(mixed.quiet_v, mixed.frames_v, True)
+    tuned = imager.show(mixed.untouched_v, mixed.frames_v, True)
     curves = signed_curves_of(
         tuned, mixed.conductive, mixed.resistive, evaluation_sets.image_scorer
     )

@@ -42,8 +42,8 @@ class Imager(Protocol):
     """Frames to images; where not ``signed``, only increases of conductivity are looked for, if it
     can be told to."""
 
-    def show(self, quiet_v: FloatArray, frames_v: FloatArray, signed: bool) -> Shown:
-        """Images of ``frames_v`` (k, m) against the mean of ``quiet_v`` (q, m)."""
+    def show(self, untouched_v: FloatArray, frames_v: FloatArray, signed: bool) -> Shown:
+        """Images of ``frames_v`` (k, m) against the mean of ``untouched_v`` (q, m)."""
 
 
 @dataclass(frozen=True)
@@ -141,9 +141,9 @@ class BaselineImager:
         self._kind, self._method = kind, method
         self._fold = tank.protocol.reciprocal_pairs()
 
-    def show(self, quiet_v: FloatArray, frames_v: FloatArray, signed: bool) -> Shown:
+    def show(self, untouched_v: FloatArray, frames_v: FloatArray, signed: bool) -> Shown:
         """As :class:`Imager`; ``signed`` changes nothing."""
-        data = datum(self._kind, frames_v, quiet_v.mean(axis=0))
+        data = datum(self._kind, frames_v, untouched_v.mean(axis=0))
         sign = np.ones_like(self._fold.sign) if self._kind == "normalised" else self._fold.sign
         first, second = data[:, self._fold.first], data[:, self._fold.second]
         folded = np.where(self._fold.second >= 0, 0.5 * (first + sign * second), first)
@@ -171,10 +171,10 @@ class CoreImager:
             iterations=levers.iterations, lambda_rel=levers.lambda_rel, **(options or {})
         )
 
-    def show(self, quiet_v: FloatArray, frames_v: FloatArray, signed: bool) -> Shown:
+    def show(self, untouched_v: FloatArray, frames_v: FloatArray, signed: bool) -> Shown:
         """As :class:`Imager`."""
         self._solver.set_options(sign="both" if signed else "increase")
-        self._solver.tare(quiet_v)
+        self._solver.tare(untouched_v)
         results = []
         for frame in frames_v:
             self._solver.forget()

@@ -93,7 +93,7 @@ def _measured(
     tank: SimulatedTank, evaluation_sets: EvaluationSets, levers: Levers
 ) -> dict[str, Any]:
     imager = CoreImager(tank, levers)
-    tuned = imager.show(evaluation_sets.metal.quiet_v, evaluation_sets.metal.frames_v, False)
+    tuned = imager.show(evaluation_sets.metal.untouched_v, evaluation_sets.metal.frames_v, False)
     curves = miou_curves(
         evaluation_sets.image_scorer, tuned.images, evaluation_sets.metal.conductive
     )

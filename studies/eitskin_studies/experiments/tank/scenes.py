@@ -21,11 +21,11 @@ RULES = TouchRules(
 
 @dataclass(frozen=True, eq=False)
 class Set:
-    """Frames with their truth: ``quiet_v`` (q, m), ``frames_v`` (k, m); ``conductive`` and
+    """Frames with their truth: ``untouched_v`` (q, m), ``frames_v`` (k, m); ``conductive`` and
     ``resistive`` (k, p) on a raster, and the objects' places, (t, 2) mm a frame."""
 
     name: str
-    quiet_v: FloatArray
+    untouched_v: FloatArray
     frames_v: FloatArray
     conductive: BoolArray
     resistive: BoolArray
@@ -65,7 +65,7 @@ def simulated(
     ]
     return Set(
         f"{role}, seed {seed}",
-        session.exact_quiet_v[None],
+        session.exact_untouched_v[None],
         noisy(session, share),
         masks[0],
         masks[1],
@@ -76,7 +76,7 @@ def simulated(
 
 def noisy(session: FrameSession, share: float) -> FloatArray:
     """The session's frames (k, m) with white noise of ``share`` of the rms of each one's change."""
-    change = session.exact_v - session.exact_quiet_v
+    change = session.exact_v - session.exact_untouched_v
     names = [
         stream(session.touches.seed, f"noise {session.touches.role}", k) for k in range(len(change))
     ]

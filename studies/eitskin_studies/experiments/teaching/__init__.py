@@ -130,7 +130,7 @@ def _judged(taught: Taught, judged: Presses, seed: int) -> dict[str, Any]:
         "p95": float(np.quantile(error, 0.95)),
         "single": float(np.mean(number == 1)),
     }
-    law = taught.model.load
+    law = taught.model.force_law
     if law is not None and judged.depth_mm is not None:
         depth = law.forces_at(judged.place_mm, strength)
         out["depth_rms"] = float(np.sqrt(np.mean((depth - judged.depth_mm) ** 2)))

@@ -52,7 +52,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     names = tuple(way.name for way in ways(measurer.model))
     shown = max(streams[50], key=lambda one: sum(int(finger.there.sum()) for finger in one.samples))
     ends = [way for way in ways(measurer.model) if way.name in ("off", "all")]
-    both = {way.name: measurer.told(shown, SNRS_DB[0], way.options)[0] for way in ends}
+    both = {way.name: measurer.reported(shown, SNRS_DB[0], way.options)[0] for way in ends}
     tables = (
         _by_speed(done), _by_part(done, names),
         _chosen(measurer, settings.tuning_seed, settings.count(TUNING_STREAMS)),

@@ -1,5 +1,5 @@
-"""What a stream's touches are worth against the truth: counts, places, ids, and how late births and
-deaths are told."""
+"""What a stream's touches are worth against the truth: counts, places, ids, and how late starts and
+ends are reported."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
@@ -22,7 +22,7 @@ class TrackCount:
         switches: how often a finger that is found again has another id than when it was last found.
         fingers, never: true fingers, and those that were not found in any frame.
         late: frames from a finger's first until it is found, of those that are.
-        ghost: frames after a finger's last in which its id is still told, and not of another
+        ghost: frames after a finger's last in which its id is still reported, and not of another
             finger.
         errors_mm: position error of every touch that was found.
         macs: multiply-accumulates of all frames, touches included.
@@ -62,19 +62,19 @@ def total(counts: Sequence[TrackCount]) -> TrackCount:
     return sum(counts, TrackCount())
 
 
-def count_stream(stream: TouchStream, told: Sequence[Sequence[Touch]], macs: int) -> TrackCount:
-    """The touches ``told`` in each frame of ``stream``.
+def count_stream(stream: TouchStream, reported: Sequence[Sequence[Touch]], macs: int) -> TrackCount:
+    """The touches ``reported`` in each frame of ``stream``.
 
     Raises:
         MissingExtraError: scipy is not installed.
     """
-    count = TrackCount(frames=len(told), macs=macs)
+    count = TrackCount(frames=len(reported), macs=macs)
     first: dict[int, int] = {}
     last: dict[
         int, tuple[int, int]
     ] = {}  # finger: the frame in which it was last found, and its id there
-    stray: list[set[int]] = []  # ids that are told and are no finger's
-    for frame, touches in enumerate(told):
+    stray: list[set[int]] = []  # ids that are reported and are no finger's
+    for frame, touches in enumerate(reported):
         there, true_mm, _ = stream.true_mm(frame)
         matching = match(true_mm, np.array([(t.x_mm, t.y_mm) for t in touches]))
         count.exact += matching.exact

@@ -1,5 +1,5 @@
-"""Streams measured with noise and reconstructed by the core: what is told in each frame, by each
-way of tracking."""
+"""Streams measured with noise and reconstructed by the core: what is reported in each frame, by
+each way of tracking."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -87,12 +87,12 @@ class Measurer:
         }
 
         def make() -> dict[str, object]:
-            told, macs = self.told(stream, snr_db, way.options)
-            return count_stream(stream, told, macs).as_dict()
+            reported, macs = self.reported(stream, snr_db, way.options)
+            return count_stream(stream, reported, macs).as_dict()
 
         return TrackCount(**self.workspace.kept(facts, make))
 
-    def told(
+    def reported(
         self, stream: TouchStream, snr_db: float, options: Options
     ) -> tuple[list[tuple[Touch, ...]], int]:
         """The touches of each frame, and the MACs of all."""
@@ -109,17 +109,17 @@ class Measurer:
         span_v = how.adc_headroom * float(np.abs(exact_v[0]).max())
         assert how.adc_bits is not None
         converter = (noise_v, 2 * span_v / 2**how.adc_bits, span_v, self.workspace.settings.seed)
-        quiet_v, _ = measure(
+        untouched_v, _ = measure(
             np.tile(exact_v[0], (Measurement.quiet_frames, 1)), *converter, f"quiet {stream.name}"
         )
         frames_v, _ = measure(exact_v[1:], *converter, f"frame {stream.name}")
         self._skin.set_options(options)
-        self._skin.tare(quiet_v)
+        self._skin.tare(untouched_v)
         self._skin.forget()
         return frames_v
 
     def _exact_v(self, stream: TouchStream) -> FloatArray:
-        """The quiet frame, then those of the stream, without noise: (1 + f, m)."""
+        """The untouched frame, then those of the stream, without noise: (1 + f, m)."""
 
         def make() -> dict[str, FloatArray]:
             return {

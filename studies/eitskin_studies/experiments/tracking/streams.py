@@ -56,8 +56,8 @@ class TouchStream:
                 [vars(track.law) for track in self.tracks], CONTACTS]  # fmt: skip
 
     def scene(self, elements: int = ELEMENTS) -> Scene:
-        """For the forward model: without noise, one quiet frame; contacts that differ, as in every
-        other set."""
+        """For the forward model: without noise, one untouched frame; contacts that differ, as in
+        every other set."""
         return Scene(
             self.name, touches=self.tracks, frames=FRAMES, rate_hz=RATE_HZ, quiet_frames=1,
             elements=elements, solver="update", frozen=True,

@@ -65,7 +65,7 @@ RANDOM = {
 
 
 def _frames(effects: dict[str, Any], seed: int = 5, frames: int = 2) -> FloatArray:
-    """Frames of a press that is nowhere symmetrical, without a quiet frame."""
+    """Frames of a press that is nowhere symmetrical, without an untouched frame."""
     table = {
         "scene": {"seed": seed, "frames": frames, "quiet_frames": 1, "elements": 1200},
         "touch": [{"x_mm": 37.0, "y_mm": 22.0, "radius_mm": 20.0, "contrast": 9.0}],

@@ -1,4 +1,4 @@
-"""The rooms of csrc/src and firmware: which may include which, and which part of a context each
+"""The modules of csrc/src and firmware: which may include which, and which part of a context each
 writes."""
 
 import re
@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from build_tools import CSRC, ROOT
 
-# from the ground up: a room includes those before it, and itself
-ROOMS = (
+# from the ground up: a module includes those before it, and itself
+MODULES = (
     "base",
     "kernels",
     "model",
@@ -28,7 +28,7 @@ APART = {
     "gesture": ("base", "gesture"),
     "fast": ("base", "context", "fast"),
 }
-# which rooms write the fields of each part of a context; api lays out, and starts and ends stages
+# which modules write the fields of each part of a context; api lays out, and starts and ends stages
 OWNERS = {
     "reference": {"frame"},
     "rows": {"diagnostics"},
@@ -57,36 +57,37 @@ MOST_FILES = 12
 SOURCES = sorted((CSRC / "src").rglob("*.[ch]"))
 
 
-def room_of(path: Path) -> str:
+def module_of(path: Path) -> str:
     return path.relative_to(CSRC / "src").parts[0]
 
 
 def includes(text: str) -> list[str]:
-    """Of the core's own files, as "frame/fold.h"; public headers ("eitskin/...") are no room's."""
+    """Of the core's own files, as "frame/fold.h"; public headers ("eitskin/...") are no
+    module's."""
     names = re.findall(r'^\s*#\s*include\s*"([^"]+)"', text, re.M)
     return [name for name in names if not name.startswith("eitskin/")]
 
 
-def allowed(room: str) -> tuple[str, ...]:
-    return APART.get(room) or ROOMS[: ROOMS.index(room) + 1]
+def allowed(module: str) -> tuple[str, ...]:
+    return APART.get(module) or MODULES[: MODULES.index(module) + 1]
 
 
-def strangers(text: str, room: str) -> list[str]:
-    """Parts of the context that ``text`` assigns to although they belong to another room."""
+def strangers(text: str, module: str) -> list[str]:
+    """Parts of the context that ``text`` assigns to although they belong to another module."""
     bare = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
     written = re.findall(
         r"\bctx->(\w+)(?:\.\w+|->\w+|\[[^]]*\])+\s*(?:[-+*/|&^]|<<|>>)?=(?!=)", bare
     )
     written += re.findall(r"(?:\+\+|--)ctx->(\w+)\.", bare)
-    return sorted({part for part in written if room not in OWNERS.get(part, {room})})
+    return sorted({part for part in written if module not in OWNERS.get(part, {module})})
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(CSRC / "src")))
 def test_a_file_keeps_to_its_room(path):
-    text, room = path.read_text(encoding="ascii"), room_of(path)
-    assert {name.split("/")[0] for name in includes(text)} <= set(allowed(room))
-    if room != "api":
-        assert strangers(text, room) == []
+    text, module = path.read_text(encoding="ascii"), module_of(path)
+    assert {name.split("/")[0] for name in includes(text)} <= set(allowed(module))
+    if module != "api":
+        assert strangers(text, module) == []
         # memory that nobody owns is handed down, not fetched
         assert not re.search(r"\bctx->scratch\b", text)
 
@@ -172,7 +173,7 @@ def test_the_firmwares_modules_hide_their_state():
         assert len(re.findall(r"^struct fw_\w+ {", state, re.M)) == 1
 
 
-def test_rooms_are_small():
+def test_modules_are_small():
     counts = Counter(path.parent for path in SOURCES)
-    assert {path.name for path in counts} == {*ROOMS, *APART}
+    assert {path.name for path in counts} == {*MODULES, *APART}
     assert max(counts.values()) <= MOST_FILES

@@ -10,41 +10,41 @@ import pytest
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import ModelError
 from eitskin.model.eitm import HEADER, decode_model, encode_model, encode_tested
-from eitskin.model.force_law import HEAD, LoadLaw, decode_load, encode_load, terms_of
+from eitskin.model.force_law import HEAD, ForceLaw, decode_force_law, encode_force_law, terms_of
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 from small_models import prebuilt, session
 
 
-def law(order: int = 2) -> LoadLaw:
+def law(order: int = 2) -> ForceLaw:
     strength = np.array([0.0, 1.0, 2.5, 4.0], dtype=np.float32)
-    load = np.array([0.0, 0.4, 1.2, 2.6], dtype=np.float32)
+    force = np.array([0.0, 0.4, 1.2, 2.6], dtype=np.float32)
     gain = np.resize(np.float32([1.0, 0.05, -0.1, 0.2, 0.03, 0.15]), len(terms_of(order)))
-    return LoadLaw(strength, load, gain, order, 97.0, 0.9, 0.03)
+    return ForceLaw(strength, force, gain, order, 97.0, 0.9, 0.03)
 
 
 def test_without_it_nothing_changes():
     model, blob = prebuilt()
-    assert model.load is None
+    assert model.force_law is None
     assert encode_tested(model) == blob
     assert b"LOAD" not in blob[:512]
 
 
 @pytest.mark.parametrize("order", range(5))
 def test_it_is_read_as_written(order):
-    blob = encode_model(replace(prebuilt()[0], load=law(order)))
+    blob = encode_model(replace(prebuilt()[0], force_law=law(order)))
     assert HEADER.unpack_from(blob)[1:3] == (1, 10)
-    read = decode_model(blob, "made").load
-    assert read is not None and encode_load(read) == encode_load(law(order))
+    read = decode_model(blob, "made").force_law
+    assert read is not None and encode_force_law(read) == encode_force_law(law(order))
     CoreEngine(blob, "float32")  # opens
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_touches_carry_the_load_of_strength_and_place(engine):
-    model = replace(prebuilt()[0], load=law())
+def test_touches_carry_the_force_of_strength_and_place(engine):
+    model = replace(prebuilt()[0], force_law=law())
     skin, bare = Reconstructor(model, engine=engine), Reconstructor(prebuilt()[0], engine=engine)
     seen = 0
     for one in (skin, bare):
-        one.tare(session().quiet_v)
+        one.tare(session().untouched_v)
     for frame in session().frames_v[:6]:
         touches, without = skin.reconstruct(frame).touches, bare.reconstruct(frame).touches
         forces = [touch.force_n for touch in touches]
@@ -87,7 +87,7 @@ def test_gains_stay_within_a_quarter_and_four(constant, gain):
     assert constant_law.gains_at(np.zeros((1, 2))) == pytest.approx([gain])
 
 
-WHOLE = encode_load(law())
+WHOLE = encode_force_law(law())
 
 
 def changed(at: int, layout: str, value: float) -> bytes:
@@ -112,9 +112,9 @@ WRONG = {
 def test_both_readers_refuse_what_is_out_of_range(content, monkeypatch):
     said = r"calibration \(section 'LOAD'\) that is out of range; calibrate again"
     with pytest.raises(ModelError, match=said):
-        decode_load(content, "made")
-    monkeypatch.setattr("eitskin.model.eitm_sections.encode_load", lambda _: content)
-    blob = encode_model(replace(prebuilt()[0], load=law()))
+        decode_force_law(content, "made")
+    monkeypatch.setattr("eitskin.model.eitm_sections.encode_force_law", lambda _: content)
+    blob = encode_model(replace(prebuilt()[0], force_law=law()))
     for read in (lambda: decode_model(blob, "made"), lambda: CoreEngine(blob, "float32")):
         with pytest.raises(ModelError):
             read()
@@ -122,4 +122,4 @@ def test_both_readers_refuse_what_is_out_of_range(content, monkeypatch):
 
 def test_what_no_reader_takes_is_not_written():
     with pytest.raises(ModelError):
-        encode_load(replace(law(), radius_mm=-1.0))
+        encode_force_law(replace(law(), radius_mm=-1.0))

@@ -1,4 +1,4 @@
-"""Pages show every picture; pictures are compressed."""
+"""The pages of results show every picture, and pictures are compressed."""
 
 import re
 from pathlib import Path
