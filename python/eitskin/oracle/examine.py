@@ -6,42 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from eitskin.arrays import BoolArray, FloatArray, IntArray
-from eitskin.core.constants_table import (
-    CROWD_CLEAR,
-    CROWD_CLEAREST,
-    CROWD_FAINT,
-    CROWD_FAR,
-    CROWD_LEFT,
-    CROWD_MIN,
-    CROWD_NEAREST,
-    CROWD_OFFSET,
-    CROWD_STRONG,
-    CROWD_TOUCHES,
-    CROWD_WEAKEST,
-    CROWD_WIDEST,
-    MISMATCH_FRACTION,
-    MISMATCH_NOISE,
-    NOISY_FRACTION,
-    OUTLIER_ENERGY,
-    OUTLIER_FRACTION,
-    OUTLIER_LARGEST,
-    OUTLIER_MAX,
-    OUTLIER_NEARER,
-    OUTLIER_NOISE,
-    OUTLIER_PIVOT,
-    OUTLIER_RIDGE,
-    OUTLIER_ROBUST,
-    OUTLIER_UNPAIRED,
-    ROW_DEAD_FRACTION,
-    ROW_DEAD_NOISE,
-    ROW_GROWN,
-    ROW_SIGNIFICANT,
-    ROW_SIGNIFICANT_NOISE,
-    ROW_SMALL,
-    ROWS_TO_JUDGE,
-    STALE_NOISE,
-    STALE_RATIO,
-)
+from eitskin.core import constants_table as limits
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.results import Options
 from eitskin.model.model import Model
@@ -85,21 +50,21 @@ def electrodes(
 ) -> BoolArray:
     """Rows (m,) to leave out: of open and bridged electrodes, and impossible ones."""
     table = model.protocol.drive_measure.astype(int)
-    noise, v0 = ROW_DEAD_NOISE * ref.noise_v, np.nan_to_num(ref.v0)
+    noise, v0 = limits.ROW_DEAD_NOISE * ref.noise_v, np.nan_to_num(ref.v0)
     size, along = np.abs(v0), np.where(unusable, 0.0, frame * np.where(v0 < 0, -1, 1))
-    limit = np.maximum(ROW_DEAD_FRACTION * size, noise)
-    clear = max(ROW_SIGNIFICANT * ref.rms_v, ROW_SIGNIFICANT_NOISE * noise)
+    limit = np.maximum(limits.ROW_DEAD_FRACTION * size, noise)
+    clear = max(limits.ROW_SIGNIFICANT * ref.rms_v, limits.ROW_SIGNIFICANT_NOISE * noise)
     judged = np.isfinite(ref.v0) & (size >= clear)
     turned = judged & ~unusable & (along <= -limit)
     alive = judged & ~unusable & (np.abs(along) >= limit)
     silent = judged & ~unusable & ~alive
-    most = ROW_GROWN * np.maximum(size, ROW_SMALL * ref.rms_v) + noise
+    most = limits.ROW_GROWN * np.maximum(size, limits.ROW_SMALL * ref.rms_v) + noise
     grown = ~unusable & (np.abs(along) > most)
-    few_dead = (judged & ~alive).sum() < ROWS_TO_JUDGE
+    few_dead = (judged & ~alive).sum() < limits.ROWS_TO_JUDGE
     out = np.zeros(len(frame), dtype=bool)
-    if turned.sum() >= ROWS_TO_JUDGE:
+    if turned.sum() >= limits.ROWS_TO_JUDGE:
         found.say("model mismatch")
-    if 0 < turned.sum() + grown.sum() < ROWS_TO_JUDGE and found.say("outlier"):
+    if 0 < turned.sum() + grown.sum() < limits.ROWS_TO_JUDGE and found.say("outlier"):
         out = turned | grown
         alive = alive & ~out
         found.outliers += int(out.sum())
@@ -107,7 +72,7 @@ def electrodes(
         return out
     opened, told = _open(model, table, judged, alive, silent)
     if len(opened) == told:  # all electrodes at once: it is not the electrodes
-        found.no_signal = int(silent.sum()) >= ROWS_TO_JUDGE
+        found.no_signal = int(silent.sum()) >= limits.ROWS_TO_JUDGE
         return out
     if opened and found.say("electrode open"):
         found.open_electrodes = opened
@@ -128,9 +93,9 @@ def _open(
     for e in range(model.protocol.n_electrodes):
         uses, drives = (table == e).any(axis=1) & judged, (table[:, :2] == e).any(axis=1) & judged
         partners = set(table[drives, :2].ravel()) - {e}
-        lifeless = uses.sum() >= ROWS_TO_JUDGE and not (uses & alive).any()
-        floats = drives.sum() >= ROWS_TO_JUDGE and silent[drives].all() and len(partners) > 1
-        told += int(uses.sum() >= ROWS_TO_JUDGE)
+        lifeless = uses.sum() >= limits.ROWS_TO_JUDGE and not (uses & alive).any()
+        floats = drives.sum() >= limits.ROWS_TO_JUDGE and silent[drives].all() and len(partners) > 1
+        told += int(uses.sum() >= limits.ROWS_TO_JUDGE)
         if lifeless or floats:
             opened.append(e)
     return tuple(opened), told
@@ -150,7 +115,7 @@ def _bridged(
     for pair in {frozenset(two) for row in table[dead].tolist() for two in (row[:2], row[2:])}:
         across = _across(table, set(pair)) & without
         lives = all((alive & (table == e).any(axis=1)).any() for e in pair)
-        if lives and not (across & alive).any() and (across & dead).sum() >= ROWS_TO_JUDGE:
+        if lives and not (across & alive).any() and (across & dead).sum() >= limits.ROWS_TO_JUDGE:
             found |= pair
     return tuple(sorted(found))
 
@@ -164,15 +129,15 @@ def flagged(model: Model, folded: Folded, ref: Reference) -> IntArray:
     with np.errstate(divide="ignore", invalid="ignore"):
         if ref.noise_v > 0 and model.data_kind == "normalised":
             each = ref.noise_v * np.hypot(1 / ref.v0[fold.first], 1 / ref.v0[fold.second])
-            most = OUTLIER_NOISE * each
+            most = limits.OUTLIER_NOISE * each
         elif ref.noise_v > 0:
             one = abs(ref.gain) * ref.row_gain[fold.first] * ref.noise_v
-            most = OUTLIER_NOISE * np.sqrt(2) * one
+            most = limits.OUTLIER_NOISE * np.sqrt(2) * one
         else:
             spread = robust(off[folded.both])
-            most = np.full(len(off), OUTLIER_ROBUST * spread if spread > 0 else np.inf)
-    large = off > OUTLIER_LARGEST * np.abs(folded.d).max(initial=0.0)
-    own = off > OUTLIER_FRACTION * (np.abs(folded.d) + off / 2)
+            most = np.full(len(off), limits.OUTLIER_ROBUST * spread if spread > 0 else np.inf)
+    large = off > limits.OUTLIER_LARGEST * np.abs(folded.d).max(initial=0.0)
+    own = off > limits.OUTLIER_FRACTION * (np.abs(folded.d) + off / 2)
     return np.flatnonzero(folded.both & (off > most) & large & own)
 
 
@@ -180,15 +145,15 @@ def outliers(model: Model, folded: Folded, ref: Reference, found: Found) -> Bool
     """Rows (m,) to leave out as outliers, or because of noisy electrodes."""
     out, fold = np.zeros(model.protocol.n_rows, dtype=bool), model.fold
     which = flagged(model, folded, ref)
-    if len(which) > OUTLIER_MAX:
+    if len(which) > limits.OUTLIER_MAX:
         return _noisy(model, which, found)
     if not len(which) or not found.say("outlier"):
         return out
     expected = predicted(model, folded, which)
     for k, value in zip(which, expected, strict=True):
         first, second = (abs(folded.d[k] + side * folded.apart[k] / 2 - value) for side in (1, -1))
-        out[fold.first[k]] = not first <= OUTLIER_NEARER * second
-        out[fold.second[k]] = not second <= OUTLIER_NEARER * first
+        out[fold.first[k]] = not first <= limits.OUTLIER_NEARER * second
+        out[fold.second[k]] = not second <= limits.OUTLIER_NEARER * first
     found.outliers += int(out.sum())
     return out
 
@@ -200,8 +165,8 @@ def predicted(model: Model, folded: Folded, which: IntArray) -> FloatArray:
     if model.row_form is None or not folded.known.all():
         return nothing
     u, s, _, _ = singular(model)
-    answers, ridge = u * s, OUTLIER_RIDGE * s.max() ** 2 * np.eye(len(s))
-    if not _own_part(answers, ridge, which) > OUTLIER_PIVOT:
+    answers, ridge = u * s, limits.OUTLIER_RIDGE * s.max() ** 2 * np.eye(len(s))
+    if not _own_part(answers, ridge, which) > limits.OUTLIER_PIVOT:
         return nothing
     others = np.delete(np.arange(len(folded.d)), which)
     normal = answers[others].T @ answers[others] + ridge
@@ -227,7 +192,7 @@ def _noisy(model: Model, which: IntArray, found: Found) -> BoolArray:
     table, out = model.protocol.drive_measure.astype(int), np.zeros(model.protocol.n_rows, bool)
     used = table[model.fold.first[which]]
     shared = np.array([(used == e).sum() for e in range(model.protocol.n_electrodes)])
-    names = tuple(int(e) for e in np.flatnonzero(shared >= NOISY_FRACTION * len(which)))
+    names = tuple(int(e) for e in np.flatnonzero(shared >= limits.NOISY_FRACTION * len(which)))
     if not names:
         found.say("model mismatch")
         return out
@@ -273,7 +238,9 @@ def mismatch(
         return False
     fraction = float(np.sqrt(beyond / (whole @ whole)))
     found.model_mismatch = min(fraction, 1.0)
-    return fraction > MISMATCH_FRACTION and float(off @ off) > MISMATCH_NOISE**2 * noise
+    return (
+        fraction > limits.MISMATCH_FRACTION and float(off @ off) > limits.MISMATCH_NOISE**2 * noise
+    )
 
 
 def unpaired(model: Model, folded: Folded, found: Found) -> BoolArray:
@@ -283,12 +250,14 @@ def unpaired(model: Model, folded: Folded, found: Found) -> BoolArray:
     if "outlier" not in found.wanted or "model mismatch" in found.names or folded.apart.any():
         return out
     u, s, _, _ = singular(model)
-    hat = (u * (s**2 / (s**2 + OUTLIER_RIDGE * s.max() ** 2))) @ u.T
+    hat = (u * (s**2 / (s**2 + limits.OUTLIER_RIDGE * s.max() ** 2))) @ u.T
     off, left = np.abs(folded.d - hat @ folded.d), 1 - np.diag(hat)
-    size = np.where(left > OUTLIER_PIVOT, off / np.sqrt(np.maximum(left, OUTLIER_PIVOT)), 0.0)
+    size = np.where(
+        left > limits.OUTLIER_PIVOT, off / np.sqrt(np.maximum(left, limits.OUTLIER_PIVOT)), 0.0
+    )
     worst = int(size.argmax())
-    alone = size[worst] ** 2 > OUTLIER_ENERGY * float(off @ off)
-    if alone and size[worst] > OUTLIER_UNPAIRED * robust(size):
+    alone = size[worst] ** 2 > limits.OUTLIER_ENERGY * float(off @ off)
+    if alone and size[worst] > limits.OUTLIER_UNPAIRED * robust(size):
         rows = [model.fold.first[worst], model.fold.second[worst]]
         out[[row for row in rows if row >= 0]] = True
         found.outliers += int(out.sum())
@@ -306,7 +275,7 @@ def stale(correlation: FloatArray, options: Options, lambda_noise: float, found:
     other = "decrease" if options.sign == "increase" else "increase"
     against = greatest(correlation, other)
     ahead = greatest(correlation, options.sign)
-    if against > STALE_RATIO * ahead and against > STALE_NOISE * lambda_noise:
+    if against > limits.STALE_RATIO * ahead and against > limits.STALE_NOISE * lambda_noise:
         found.say("stale reference")
 
 
@@ -319,19 +288,19 @@ def crowded(
 ) -> bool:
     """Whether there are more touches than can be separated, by a linear score; ``clearness``:
     lambda_max over lambda_noise."""
-    if not touches or clearness < CROWD_FAINT:
+    if not touches or clearness < limits.CROWD_FAINT:
         return False
     apart = [
         np.hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) / (a.radius_mm + b.radius_mm)
         for a, b in combinations(touches, 2)
     ]
-    weakest, clear = min(t.explained for t in touches), CROWD_CLEAR
+    weakest, clear = min(t.explained for t in touches), limits.CROWD_CLEAR
     if weakest < clear**2 * unexplained:
         clear = float(np.sqrt(weakest / unexplained))
-    score = CROWD_OFFSET
-    score += CROWD_TOUCHES * len(touches) / model.protocol.n_electrodes
-    score += CROWD_NEAREST * min([CROWD_FAR, *apart])
-    score += CROWD_WIDEST * max(t.radius_mm for t in touches) / options.touch_seed_radius_mm
-    score += CROWD_LEFT * np.sqrt(unexplained) + CROWD_CLEAREST * clear
-    score += CROWD_WEAKEST * min(CROWD_STRONG, np.sqrt(weakest) * clearness)
-    return len(touches) >= options.max_touches or bool(score < CROWD_MIN)
+    score = limits.CROWD_OFFSET
+    score += limits.CROWD_TOUCHES * len(touches) / model.protocol.n_electrodes
+    score += limits.CROWD_NEAREST * min([limits.CROWD_FAR, *apart])
+    score += limits.CROWD_WIDEST * max(t.radius_mm for t in touches) / options.touch_seed_radius_mm
+    score += limits.CROWD_LEFT * np.sqrt(unexplained) + limits.CROWD_CLEAREST * clear
+    score += limits.CROWD_WEAKEST * min(limits.CROWD_STRONG, np.sqrt(weakest) * clearness)
+    return len(touches) >= options.max_touches or bool(score < limits.CROWD_MIN)

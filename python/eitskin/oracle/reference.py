@@ -6,19 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from eitskin.arrays import BoolArray, FloatArray
-from eitskin.core.constants_table import (
-    CHANGED_AS_MUCH,
-    MAX_DISTANCE,
-    MAX_RECIPROCITY,
-    MAX_ROW_GAIN,
-    OUTLIER_MAX,
-    OWN_MIN,
-    PAIRED,
-    PAIRED_MIN,
-    ROBUST,
-    UNPAIRED,
-    UNPAIRED_MIN,
-)
+from eitskin.core import constants_table as limits
 from eitskin.errors import FrameError
 from eitskin.model.model import Model
 from eitskin.oracle.folding import Reference, fold_means
@@ -28,7 +16,7 @@ DEAD = "all voltages are zero; is the skin driven and connected?"
 
 def robust(values: FloatArray) -> float:
     """The deviation that the upper median of ``values`` >= 0 suggests where they are normal."""
-    return ROBUST * float(np.sort(values)[len(values) // 2]) if len(values) else 0.0
+    return limits.ROBUST * float(np.sort(values)[len(values) // 2]) if len(values) else 0.0
 
 
 def noise_of(frames: FloatArray) -> float:
@@ -65,7 +53,7 @@ def with_row_gains(model: Model, ref: Reference, wanted: bool) -> Reference:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = expected / (ref.gain * ref.drift_v0)
     same_sign = np.isfinite(ratio) & (ratio > 0)
-    gains = np.where(same_sign, np.clip(ratio, 1 / MAX_ROW_GAIN, MAX_ROW_GAIN), 1.0)
+    gains = np.where(same_sign, np.clip(ratio, 1 / limits.MAX_ROW_GAIN, limits.MAX_ROW_GAIN), 1.0)
     usable = np.isfinite(ref.drift_v0)
     _, apart, first, second = fold_means(model, np.nan_to_num(ref.drift_v0), usable, fold.sign)
     log_gain = np.log(np.where(first, gains[fold.first], gains[fold.second]))
@@ -74,7 +62,7 @@ def with_row_gains(model: Model, ref: Reference, wanted: bool) -> Reference:
     distance = np.sqrt(np.nanmean(log_gain**2))
     reciprocity = np.sqrt(np.mean(apart[both] ** 2)) / ref.rms_v if both.any() else 0.0
     tells = model.model_errors is not None and model.data_kind != "normalised"
-    far = tells and bool(distance > MAX_DISTANCE or reciprocity > MAX_RECIPROCITY)
+    far = tells and bool(distance > limits.MAX_DISTANCE or reciprocity > limits.MAX_RECIPROCITY)
     in_force = (
         tells
         and not far
@@ -99,11 +87,13 @@ def odd_folds(model: Model, newer: FloatArray, older: FloatArray, used: BoolArra
     both_sides = np.where(fold.second >= 0, fold.second, fold.first)
     larger = np.maximum(np.abs(change[fold.first]), np.abs(change[both_sides]))
     off = apart if paired else larger
-    spread, least = (PAIRED, PAIRED_MIN) if paired else (UNPAIRED, UNPAIRED_MIN)
+    spread, least = (
+        (limits.PAIRED, limits.PAIRED_MIN) if paired else (limits.UNPAIRED, limits.UNPAIRED_MIN)
+    )
     limit = max(spread * robust(off), least * float(size.max()))
     own = np.maximum(size[fold.first], size[both_sides])
-    odd = np.asarray((off > limit) & (off > OWN_MIN * own))
-    return odd if odd.sum() <= OUTLIER_MAX else np.zeros_like(odd)
+    odd = np.asarray((off > limit) & (off > limits.OWN_MIN * own))
+    return odd if odd.sum() <= limits.OUTLIER_MAX else np.zeros_like(odd)
 
 
 def changed_rows(
@@ -117,7 +107,11 @@ def changed_rows(
         for row in (first, second):
             partner = second if row == first else first
             other = change[partner] if partner >= 0 else 0.0
-            if row >= 0 and 0 < change[row] <= most and change[row] >= CHANGED_AS_MUCH * other:
+            if (
+                row >= 0
+                and 0 < change[row] <= most
+                and change[row] >= limits.CHANGED_AS_MUCH * other
+            ):
                 out[row] = True
     return out
 

@@ -8,15 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eitskin.arrays import BoolArray, FloatArray
-from eitskin.core.constants_table import (
-    LOST,
-    MAX_REGULARISATION,
-    MIN_REGULARISATION,
-    MIN_REGULARISATION_FRACTION,
-    NOISE_POWER,
-    REST_POWER,
-    STEP_MARGIN,
-)
+from eitskin.core import constants_table as limits
 from eitskin.model.model import Model
 
 
@@ -46,7 +38,7 @@ class Whitening:
 def whitening(model: Model, known: BoolArray, asked: float) -> Whitening:
     """For the folds where ``known`` (k,), and noise that asks for a regularisation of ``asked``."""
     if model.row_form is not None:
-        return _of_physics(model, known, min(asked, MAX_REGULARISATION))
+        return _of_physics(model, known, min(asked, limits.MAX_REGULARISATION))
     lost = int((~known).sum())
     if model.precision is not None and 0 < lost <= min(model.rank, len(known) - model.rank):
         return _of_teaching(model, known)
@@ -78,10 +70,10 @@ def _of_physics(model: Model, known: BoolArray, asked: float) -> Whitening:
     if known.all():
         return Whitening(whole.data, whole.seen, of_all, all_ratio, none)
     left = float(known.mean())
-    lowered = max(left**REST_POWER, MIN_REGULARISATION_FRACTION) * mu
-    raised = max(lowered, left * asked, MIN_REGULARISATION)
-    part = _root_of_metric(model, known, raised, LOST * raised)
-    ratio = all_ratio * float(part.noise / stored / all_ratio) ** NOISE_POWER
+    lowered = max(left**limits.REST_POWER, limits.MIN_REGULARISATION_FRACTION) * mu
+    raised = max(lowered, left * asked, limits.MIN_REGULARISATION)
+    part = _root_of_metric(model, known, raised, limits.LOST * raised)
+    ratio = all_ratio * float(part.noise / stored / all_ratio) ** limits.NOISE_POWER
     return Whitening(part.data, part.seen, raised, ratio, none)
 
 
@@ -93,7 +85,7 @@ def _root_of_metric(model: Model, known: BoolArray, mu: float, lost: float) -> W
     metric = (t * s**2) @ t.T + mu * s.max() ** 2 * np.eye(len(s))
     values, vectors = np.linalg.eigh(metric)
     kept = np.linalg.norm(model.sensitivity[np.argmax(s)]) ** 2 * (1 + mu)
-    kept *= 1.0 if known.all() else STEP_MARGIN / (1 + lost)
+    kept *= 1.0 if known.all() else limits.STEP_MARGIN / (1 + lost)
     root = np.sqrt(kept) * (vectors / np.sqrt(values)) @ vectors.T
     data = np.zeros((len(s), len(known)))
     data[:, known] = root @ q[: known.sum()].T
