@@ -145,7 +145,7 @@ def _options_table(tables: Tables) -> Lines:
         low, high = limits(tables, kind, least, greatest)
         yield f"    OPTION({name}, {int(kind != 'real')}, {low}, {high}),"
     yield from ("};", "#undef OPTION", "")
-    yield from comment("What depends on more of a model than its defaults is 0 here.")
+    yield from comment("An option that depends on more of a model than its defaults is 0 here.")
     yield "static eits_options usual_options(const eits_defaults *d)"
     yield from ("{", "    return (eits_options){")
     for name, kind, default, *_ in rows:

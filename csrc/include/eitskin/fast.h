@@ -89,7 +89,7 @@ typedef struct eits_fast eits_fast;
  * of eits_fast that points to it. */
 /* clang-format off */
 #define EITS_FAST_ARRAYS(ARRAY, n_rows, drive_rows, nx, ny)                                        \
-    /* which row is where, and which pixels are cells */                                           \
+    /* the place of each row, and the pixels that are cells */                                     \
     ARRAY(row, uint16_t, n_rows)                                                                   \
     ARRAY(cell, uint16_t, EITS_FAST_CELLS(nx, ny))                                                 \
     ARRAY(masked, uint8_t, n_rows)                                                                 \
@@ -101,11 +101,11 @@ typedef struct eits_fast eits_fast;
     ARRAY(e, eits_real, drive_rows)                                                                \
     ARRAY(white, eits_real, drive_rows)                                                            \
     ARRAY(spare, eits_real, drive_rows)                                                            \
-    /* their answers to each touch; their covariance with the states; the factor of their own */   \
+    /* their answers to each touch; their covariance with the states; their own factor */          \
     ARRAY(answer, eits_real, EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS * (size_t)(drive_rows))  \
     ARRAY(moved, eits_real, EITS_FAST_STATES * (size_t)(drive_rows))                               \
     ARRAY(factor, eits_real, EITS_FAST_TRIANGLE(drive_rows))                                       \
-    /* the maps of what a new touch in a cell would explain: the first, and a second beside it */  \
+    /* scores of a new touch in each cell: of a first touch, and of a second beside it */          \
     ARRAY(score, eits_real, EITS_FAST_CELLS(nx, ny))                                               \
     ARRAY(pair_score, eits_real, EITS_FAST_CELLS(nx, ny))
 

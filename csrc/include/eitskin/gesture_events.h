@@ -14,7 +14,7 @@
 extern "C" {
 #endif
 
-/* What happened. */
+/* Kinds of events. */
 typedef enum eits_event_kind {
     /* a finger landed */
     EITS_EVENT_DOWN = 1,
@@ -42,7 +42,7 @@ typedef enum eits_event_kind {
     EITS_EVENT_RELEASE = 12
 } eits_event_kind;
 
-/* Where an event lies in what it reports. */
+/* The phase of a gesture that an event reports. */
 typedef enum eits_event_phase {
     /* all of it */
     EITS_PHASE_ONCE = 0,
@@ -78,7 +78,7 @@ typedef struct eits_event {
     eits_real value;
 } eits_event;
 
-/* What makes a gesture. eits_gestures_default fills it in; tables/constants.toml has the
+/* Limits of the gestures. eits_gestures_default fills it in; tables/constants.toml has the
  * reasons. */
 typedef struct eits_gesture_options {
     /* a finger that is not found for so long has lifted */

@@ -18,7 +18,7 @@ extern "C" {
 #define EITS_MAX_TOUCHES      16
 #define EITS_MAX_TRACK_FRAMES 1000u
 
-/* Which conductivity changes the image may have. */
+/* The sign of the conductivity changes that the image may have. */
 typedef enum eits_sign {
     /* x >= 0: touches by something that conducts better */
     EITS_SIGN_INCREASE = 0,

@@ -79,7 +79,7 @@ typedef enum eits_packet_type {
     EITS_PACKET_GET_HASHES = 0x8f
 } eits_packet_type;
 
-/* How a command ended, and what `detail` of the reply adds. */
+/* The result of a command; `detail` of the reply adds to it. */
 typedef enum eits_reply_status {
     /* MODEL_BEGIN: [0] the offset to go on from */
     EITS_REPLY_OK = 0,
@@ -141,7 +141,7 @@ typedef enum eits_quality {
     EITS_QUALITY_MASKED = 32
 } eits_quality;
 
-/* What is wrong with the board or the skin, and what index, value and words say. */
+/* Faults of the board or the skin, and the meaning of index, value and words. */
 typedef enum eits_fault {
     /* no bank holds a valid model; value: eits_status of the newest bank */
     EITS_FAULT_NO_MODEL = 1,
@@ -299,7 +299,7 @@ typedef struct eits_packet_info {
     uint32_t current_limit_ua_rms;
 } eits_packet_info;
 
-/* How the command with this request number ended. */
+/* The result of the command with this request number. */
 typedef struct eits_packet_reply {
     /* of the command that is answered */
     uint32_t request;
@@ -445,7 +445,7 @@ typedef struct eits_packet_followed_touch {
     float strength_s_per_m_mm2;
 } eits_packet_followed_touch;
 
-/* What happened in a frame; none where the core rejected it. */
+/* Events of a frame; there are none if the core rejected it. */
 typedef struct eits_packet_events {
     /* number of the scanned frame, as in its RAW */
     uint32_t frame;
@@ -565,7 +565,7 @@ typedef struct eits_command_plain {
     uint32_t request;
 } eits_command_plain;
 
-/* What to send of each frame. */
+/* Selects the data that the board sends per frame. */
 typedef struct eits_command_stream {
     /* never 0; the reply repeats it */
     uint32_t request;
@@ -585,7 +585,7 @@ typedef struct eits_command_tare {
     uint32_t frames;
 } eits_command_tare;
 
-/* How frames are scanned; forgets the reference. */
+/* Sets how frames are scanned; forgets the reference. */
 typedef struct eits_command_scan {
     /* never 0; the reply repeats it */
     uint32_t request;
@@ -668,7 +668,7 @@ typedef struct eits_command_mask_row {
     uint16_t masked;
 } eits_command_mask_row;
 
-/* Whether current may flow through the skin, and why not. */
+/* Current may flow through the skin, or the reason that it may not. */
 typedef enum eits_drive {
     /* no host has asked for frames */
     EITS_DRIVE_OFF = 0,

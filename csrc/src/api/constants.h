@@ -11,8 +11,8 @@
  * of 8 loses 4 exact frames after tares of 4 frames, one of 2 loses none. Check: ctest --preset
  * host -R reference */
 
-/* least that noise is learned from [frames]. larger: short tares fail; smaller: noise of one
- * difference */
+/* noise is learned from at least this many frames [frames]. larger: short tares fail; smaller:
+ * noise of one difference */
 #define EITS_MIN_REFERENCE_FRAMES 4
 
 /* clang-format on */

@@ -70,5 +70,5 @@ void eits_solve_again(eits_context *ctx, const eits_scratch *scratch, const eits
     }
     ctx->info.iterations += before.iterations;
     ctx->info.step_halvings += before.step_halvings;
-    ctx->info.diagnostics = before.diagnostics; /* those of the measured frame */
+    ctx->info.diagnostics = before.diagnostics; /* keep those of the measured frame */
 }

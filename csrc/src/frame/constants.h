@@ -13,32 +13,31 @@
  * MAX_RECIPROCITY is a guard against other instruments (test_seek). Check: eitskin study constants
  * --data FOLDER */
 
-/* no row's data are made more than this larger or smaller. larger: a row of little voltage counts
- * too much; smaller: uneven sheets stay uneven */
+/* no row's data are scaled up or down by more than this factor. larger: a row of little voltage
+ * counts too much; smaller: uneven sheets stay uneven */
 #define EITS_MAX_ROW_GAIN R(3.0)
 
-/* beyond this distance of the reference from the model, row gains are off: it is the instrument
- * that disagrees [rms log ratio]. larger: harm on instruments that differ; smaller: off on very
- * uneven sheets */
+/* row gains are off if the reference is further from the model: the instrument then differs from it
+ * [rms log ratio]. larger: harm on instruments that differ; smaller: off on very uneven sheets */
 #define EITS_MAX_DISTANCE R(0.28)
 
-/* beyond this difference of rows and their reciprocals, row gains are off [of the reference's rms].
- * as MAX_DISTANCE */
+/* row gains are off if rows differ from their reciprocals by more [of the reference's rms]. as
+ * MAX_DISTANCE */
 #define EITS_MAX_RECIPROCITY R(0.1)
 
-/* with gains of rows' own that differ by so much places are corrected by a quarter [rms log ratio].
+/* if single rows' gains differ by this much, places are corrected by a quarter [rms log ratio].
  * larger: an instrument's gains move touches; smaller: misplaced electrodes do */
 #define EITS_ROW_SPREAD R(0.03)
 
 /* ---- Chosen: by the arithmetic: half a unit in the last place of two float32 voltages, and some.
  * Check: ctest --preset host -R frame_f */
 
-/* what rounding leaves of frames without noise; float32's in any width, so that both count alike
- * [of v0_rms]. larger: light touches of very quiet front ends are missed; smaller: touches of
- * rounding */
+/* frames without noise still have this rounding; it is float32's in either width, so that both
+ * builds use the same [of v0_rms]. larger: light touches of very quiet front ends are missed;
+ * smaller: touches of rounding */
 #define EITS_NOISE_ROUNDING R(2.384185791015625e-07)
 
-/* max(S'y) of white noise, over the deviation of the pixel that hears it most [deviations]. as
+/* max(S'y) of white noise, over the deviation of the pixel with the most noise [deviations]. as
  * NOISE_ROUNDING */
 #define EITS_MAX_OF_NOISE R(3.5)
 
@@ -49,35 +48,35 @@
  * others in the log data; smaller: bends what strong touches do */
 #define EITS_MAX_RATIO R(16.0)
 
-/* a row with a smaller reference says nothing as a ratio [of the reference's rms]. larger: leaves
- * out small rows that are good; smaller: divides by noise */
+/* the ratio of a row with a smaller reference has no meaning [of the reference's rms]. larger:
+ * leaves out small rows that are good; smaller: divides by noise */
 #define EITS_RATIO_DEFINED R(1e-06)
 
 /* ---- Chosen: by the arithmetic: FOLD_ROUNDING is 16 times the rounding of one voltage, 2^-24
  * (2^-53); BASIS_TOLERANCE a guard. Study constants: neither changes an exact frame or a
  * diagnostic. Check: ctest --preset host -R outliers */
 
-/* a row and its reciprocal that differ by less agree [of the reference]. larger: outliers of
- * quantised voltages are overlooked; smaller: copied reciprocals seem to be measured */
+/* a row and its reciprocal count as equal if they differ by less [of the reference]. larger:
+ * outliers of quantised voltages are overlooked; smaller: copied reciprocals seem to be measured */
 #define EITS_FOLD_ROUNDING R(sizeof(eits_real) == 4 ? 0x1p-20 : 0x1p-49)
 
-/* what must be left of a direction beside the basis, for it to join [of its square]. larger:
- * ignores less than asked; smaller: takes rounding as a direction and ignores data */
+/* a direction joins the basis if more of it than this remains beside the basis [of its square].
+ * larger: ignores less than asked; smaller: takes rounding as a direction and ignores data */
 #define EITS_BASIS_TOLERANCE R(1e-06)
 
 /* ---- Chosen: on training scenes with one to three electrodes out, NOISE_POWER on masks of one row
  * to three electrodes; their seeds were not kept. Check: scripts/test
  * tests/python/acceptance/test_rows_left_out.py */
 
-/* where rows are left out mu falls with this power of the fraction that is left. larger: noise of
- * the weak directions; smaller: a blurred image beside the electrode */
+/* if rows are left out, mu falls with this power of the fraction that remains. larger: noise of the
+ * weak directions; smaller: a blurred image beside the electrode */
 /* REST_POWER = 3, in the source as left * left * left */
 
-/* but not below this [of the model's mu]. larger: blurs where many rows are out; smaller: lets
- * their noise through */
+/* if rows are left out, mu does not fall below this [of the model's mu]. larger: blurs where many
+ * rows are out; smaller: lets their noise through */
 #define EITS_MIN_REGULARISATION_FRACTION R(0.1)
 
-/* max(S'y) of noise grows with this power of its rms, where rows are left out. larger: misses faint
+/* if rows are left out, max(S'y) of noise grows with this power of its rms. larger: misses faint
  * touches then; smaller: shows noise as touches */
 /* NOISE_POWER = 1.25, in the source as ratio sqrt(sqrt(ratio)) */
 
@@ -86,24 +85,25 @@
  * model; LOST, NOISE_PROBES and all the other values lose none. MIN_REGULARISATION is a guard that
  * no scene and no test reaches. Check: ctest --preset host -R masked_whitening */
 
-/* least mu where rows are left out [of s_1^2]. larger: blurs; smaller: the factor of float32 breaks
- * down */
+/* minimum of mu if rows are left out [of s_1^2]. larger: blurs; smaller: the factor of float32
+ * breaks down */
 #define EITS_MIN_REGULARISATION R(0.0001)
 
-/* greatest mu that noise asks for: beyond, directions weigh as they are seen [of s_1^2]. larger:
- * changes little; smaller: noisy boards keep noise */
+/* maximum of mu for a noisy reference: beyond it, directions weigh as they are measured [of s_1^2].
+ * larger: changes little; smaller: noisy boards keep noise */
 #define EITS_MAX_REGULARISATION R(1.0)
 
-/* how little a direction that no row sees is held to zero [of mu]. larger: biases directions that
- * are seen; smaller: the factor's pivots are rounding */
+/* a direction that no row sees is held to zero with this weight [of mu]. larger: biases directions
+ * that are seen; smaller: the factor's pivots are rounding */
 #define EITS_LOST R(0.01)
 
-/* F leaves so much room below the stated Lipschitz constant [of |S_1|^2]. larger: rounding may
- * exceed the constant and FISTA rises; smaller: shorter steps */
+/* F stays this far below the stated Lipschitz constant [of |S_1|^2]. larger: rounding may exceed
+ * the constant and FISTA rises; smaller: shorter steps */
 #define EITS_STEP_MARGIN R(0.995)
 
-/* by which noise in S'F'y is estimated [sign vectors]. larger: each costs two triangles when rows
- * change; smaller: a rougher lambda_noise. They are orthogonal within each eight directions */
+/* number of sign vectors that estimate the noise in S'F'y [sign vectors]. larger: each costs two
+ * triangles when rows change; smaller: a rougher lambda_noise. They are orthogonal within each
+ * eight directions */
 #define EITS_NOISE_PROBES 8
 
 /* ---- Chosen: REFERENCE_TRACKING_TOUCH on the streams of DRIFT_UNEXPLAINED: false touches stop the
@@ -112,21 +112,20 @@
  * change none at half and at double; REFERENCE_TRACKING_LEFT is a guard. Check: eitskin study
  * teaching --data FOLDER */
 
-/* a reference that follows goes as large a part of the way at once, after as large a part of
- * reference_frames. larger: follows a touch sooner after it is lifted; smaller: goes further on one
- * mean */
+/* a tracked reference moves by one over this number at once, after reference_frames over this
+ * number. larger: follows a touch sooner after it is lifted; smaller: goes further on one mean */
 #define EITS_REFERENCE_TRACKING_PARTS 16
 
-/* a mean difference of which one column gives more looks like a touch, and is not followed [of
+/* a mean difference looks like a touch, and is not tracked, if one column explains more of it [of
  * |y|^2]. larger: light touches are followed; smaller: drift at one place is not */
 #define EITS_REFERENCE_TRACKING_TOUCH R(0.75)
 
-/* a greater change of its size at once, under touches, is not followed [of the reference]. larger:
- * what a hand does may count; smaller: fast drying is not followed */
+/* a larger change of gain at once, under touches, is not tracked [of the reference]. larger: what a
+ * hand does may count; smaller: fast drying is not followed */
 #define EITS_REFERENCE_TRACKING_GAIN R(0.02)
 
-/* what must be left of the reference, or of a touch's column, beside the columns of touches [of its
- * square]. larger: gives up near many touches; smaller: rounding tells the gain */
+/* the reference, and each touch's column, must keep more than this beside the columns of the
+ * touches [of its square]. larger: gives up near many touches; smaller: rounding tells the gain */
 #define EITS_REFERENCE_TRACKING_LEFT R(0.01)
 
 /* clang-format on */

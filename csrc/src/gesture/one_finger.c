@@ -57,7 +57,7 @@ static int is_swipe(const eits_gestures *g, eits_contact *c, eits_real dx, eits_
                     eits_real speed, event_list *out)
 {
     const eits_real length = eits_distance(dx, dy), angle = eits_angle_deg(dy, dx);
-    /* it has gone on for settle_us before it was reported */
+    /* the finger moved for settle_us before the touch was reported */
     const eits_real before = speed * (eits_real)g->options.settle_us * R(1e-6);
     if (length + before < g->options.swipe_mm || speed < g->options.swipe_mm_per_s ||
         length < EITS_SWIPE_STRAIGHT * c->farthest_mm)

@@ -30,7 +30,7 @@ typedef __m256d vector;
 #define ZERO                   _mm256_setzero_pd
 #define LOAD_WHERE(FROM, MASK) _mm256_maskload_pd(FROM, _mm256_castpd_si256(MASK))
 #define CHOOSE                 _mm256_blendv_pd
-typedef int64_t whole_number; /* as wide as a real */
+typedef int64_t whole_number; /* has the width of eits_real */
 #else
 enum { LANES = 8 };
 typedef __m256 vector;
@@ -41,7 +41,7 @@ typedef __m256 vector;
 #define ZERO                   _mm256_setzero_ps
 #define LOAD_WHERE(FROM, MASK) _mm256_maskload_ps(FROM, _mm256_castps_si256(MASK))
 #define CHOOSE                 _mm256_blendv_ps
-typedef int32_t whole_number; /* as wide as a real */
+typedef int32_t whole_number; /* has the width of eits_real */
 #endif
 
 enum { VECTORS = (int)EITS_PANEL / LANES };

@@ -22,7 +22,7 @@ static void add_eights(const float *a, const float *b, uint32_t turns, float lan
                      : LOW_S, MIDDLE_S, "cc", "memory");
 }
 
-/* The tree over lanes that begin at zero. */
+/* Returns the tree over eight lanes that begin at zero. */
 static float dot_of_eights(const float *a, const float *b, uint32_t turns)
 {
     float sum;

@@ -45,8 +45,8 @@
  * study constants opens alike, but none with FORM_MAX_NORM below 1. Check: ctest --preset host -R
  * model_values */
 
-/* what a row of section WHIT may differ by from what it says elsewhere, and from P [relative].
- * larger: a wrong section is believed; smaller: rounding makes a good model fail */
+/* the numbers of a row of section WHIT may differ by this much from each other and from P
+ * [relative]. larger: a wrong section is believed; smaller: rounding makes a good model fail */
 #define EITS_FORM_TOLERANCE 1e-3f
 
 /* the same for (s^2 + mu s_1^2) |P_i|^2, which is 1: S is rounded to 8 bits at worst. as

@@ -45,7 +45,7 @@ static const eits_option OPTIONS[] = {
 };
 #undef OPTION
 
-/* What depends on more of a model than its defaults is 0 here. */
+/* An option that depends on more of a model than its defaults is 0 here. */
 static eits_options usual_options(const eits_defaults *d)
 {
     return (eits_options){

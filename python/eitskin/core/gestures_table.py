@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class EventKind(IntEnum):
-    """eits_event_kind: What happened."""
+    """eits_event_kind: Kinds of events."""
 
     DOWN = 1  # a finger landed
     MOVE = 2  # it moved by move_mm or more since it was last reported
@@ -21,7 +21,7 @@ class EventKind(IntEnum):
 
 
 class EventPhase(IntEnum):
-    """eits_event_phase: Where an event lies in what it reports."""
+    """eits_event_phase: The phase of a gesture that an event reports."""
 
     ONCE = 0  # all of it
     BEGIN = 1  # it was recognised and goes on

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from eitskin.core.diagnostics_table import ALL_DIAGNOSTICS
 
-# eits_sign: Which conductivity changes the image may have.
+# eits_sign: The sign of the conductivity changes that the image may have.
 SIGNS = ("increase", "decrease", "both")
 # eits_solver: The method that finds the image; all minimise the same objective (solve.h).
 SOLVERS = ("fista", "working-set", "active-set")

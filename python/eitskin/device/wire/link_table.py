@@ -67,7 +67,7 @@ class PacketType(IntEnum):
 
 
 class ReplyStatus(IntEnum):
-    """eits_reply_status: How a command ended, and what `detail` of the reply adds."""
+    """eits_reply_status: The result of a command; `detail` of the reply adds to it."""
 
     OK = 0  # MODEL_BEGIN: [0] the offset to go on from
     UNKNOWN_COMMAND = 1  # no command has this packet type
@@ -108,7 +108,7 @@ class Quality(IntFlag):
 
 
 class FaultCode(IntEnum):
-    """eits_fault: What is wrong with the board or the skin, and what index, value and words say."""
+    """eits_fault: Faults of the board or the skin, and the meaning of index, value and words."""
 
     NO_MODEL = 1  # no bank holds a valid model; value: eits_status of the newest bank
     ELECTRODE_OPEN = 2  # index: electrode
@@ -134,7 +134,7 @@ class FaultCode(IntEnum):
 
 
 class Drive(IntEnum):
-    """eits_drive: Whether current may flow through the skin, and why not."""
+    """eits_drive: Current may flow through the skin, or the reason that it may not."""
 
     OFF = 0  # no host has asked for frames
     ON = 1  # a host has, and is heard
@@ -216,7 +216,7 @@ class InfoPacket(Payload, c="eits_packet_info"):
 
 @dataclass(frozen=True)
 class ReplyPacket(Payload, c="eits_packet_reply"):
-    """How the command with this request number ended."""
+    """The result of the command with this request number."""
 
     request: U32  # of the command that is answered
     command: U16  # its packet type
@@ -319,7 +319,7 @@ class FollowedTouch(Payload, c="eits_packet_followed_touch"):
 
 @dataclass(frozen=True)
 class EventsHead(Payload, c="eits_packet_events"):
-    """What happened in a frame; none where the core rejected it."""
+    """Events of a frame; there are none if the core rejected it."""
 
     frame: U32  # number of the scanned frame, as in its RAW
     time_us: U32  # when its scan began
