@@ -207,7 +207,7 @@ def test_a_press_that_does_not_fit_is_named(taught):
     report = teach(replace(some, pressed=pressed), SKIN).report
     assert 7 in report["strange_presses"] and len(report["strange_presses"]) <= 4
     every = replace(some, pressed=some.pressed + np.roll(some.difference, 11, axis=0))
-    assert any("one finger at a time" in note for note in teach(every, SKIN).report["notes"])
+    assert any("with one finger" in note for note in teach(every, SKIN).report["notes"])
 
 
 def test_without_a_description_a_stationary_kernel_says_what_is_lost():
