@@ -360,7 +360,8 @@ def test_after_a_noiseless_reference_all_widths_find_the_same(frames):
         found = [
             sizes_mm(one(e, untouched_v, reference_v + size * change_v))[:, :2] for e in ENGINES
         ]
-        assert [len(each) for each in found] == [2 if size > 0.005 else size > 0.0005] * len(ENGINES)
+        expected = 2 if size > 0.005 else size > 0.0005
+        assert [len(each) for each in found] == [expected] * len(ENGINES)
         for each in found[1:]:
             assert each == pytest.approx(found[0], abs=0.02)
 
