@@ -244,8 +244,7 @@ def test_bad_options_are_named_and_the_old_ones_stay(engine, changes, text):
         reconstructor.set_options(**changes)
     assert text in one_line(error)
     assert reconstructor.options == before
-    frame = session().frames_v[0]
-    assert reconstructor.reconstruct(frame, touches=False).info.iterations == 7
+    assert reconstructor.reconstruct(session().frames_v[0]).info.iterations == 7
 
 
 @pytest.mark.parametrize(
