@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(
         parser,
         "--engine",
-        "the C core in float32 as on a board, or in float64, or the numpy reference",
+        "the C core in float32 as on a board, or in float64, or the oracle in numpy",
         choices=("c", "c64", "numpy"),
         default="c",
     )

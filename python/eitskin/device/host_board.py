@@ -74,7 +74,7 @@ class HostBoard:
 
     @property
     def banks(self) -> list[bytes]:
-        """What the banks hold now."""
+        """The contents of the flash banks as they are now."""
         return [bytes(cells) for cells in self._banks]
 
     def restart(self) -> None:

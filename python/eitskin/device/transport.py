@@ -27,7 +27,7 @@ class SimulatedScene:
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What a kind of device can do.
+    """The capabilities of a kind of device.
 
     Attributes:
         own_clock: the board runs only while ``read`` is called (simulated, emulated, recorded). It

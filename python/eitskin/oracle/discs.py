@@ -44,7 +44,7 @@ def cover(grid: Grid, x_mm: float, y_mm: float, radius_mm: float) -> FloatArray:
 
 
 def area_mm2(model: Model, disc: Disc) -> float:
-    """What the covers add up to on the pixels that count."""
+    """Return the area that the disc covers on the pixels that count, in mm^2."""
     counted = cover(model.grid, disc.x_mm, disc.y_mm, disc.radius_mm)[model.column_weight != 0]
     return float(counted.sum()) * model.grid.pixel_area_mm2
 

@@ -1,5 +1,5 @@
-"""What a session gives to every consumer: ONE family of messages. A ``Frame``, a ``DriveReport``
-between frames, and a ``Notice`` of something beside them."""
+"""The messages that a session gives to every consumer: a ``Frame``, a ``DriveReport`` between
+frames, and a ``Notice`` of something else, such as a fault or an event of the link."""
 
 from dataclasses import asdict, dataclass, field
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""Reconstruct images and touches from frames, with the C core or the numpy reference."""
+"""Reconstruct images and touches from frames, with the C core or the oracle."""
 
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Info, LearnedReference, Options, Reconstruction
