@@ -16,7 +16,7 @@ import numpy as np
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.deform import MeshDeformation
 from eitskin.fem.mesh import Mesh, mesh_for_elements
-from eitskin.scene.cover import Cover
+from eitskin.scene.cover import Cover, with_touches
 from eitskin.scene.random_field import random_field
 from eitskin.scene.random_touches import TouchScene, TrueTouch, rim_distance_mm
 from eitskin.scene.simulate import Measurement, measure
@@ -151,16 +151,15 @@ class WorldFactory:
         if world.uneven:
             sheet *= np.exp(world.uneven * self._field(middles, draw("uneven")))
         untouched = forward.voltages(sheet, contact)
-        elements, factors = Cover(forward.mesh).factor(touches)
-        changed, amplitude = sheet.copy(), 1.0
-        changed[elements] *= factors
+        drifted, amplitude = sheet.copy(), 1.0
         if world.drift:
-            changed *= np.exp(world.drift * self._field(middles, draw("drift")))
+            drifted *= np.exp(world.drift * self._field(middles, draw("drift")))
         if world.contact_drift:
             change = world.contact_drift * draw("contact drift").standard_normal(len(contact))
             contact = contact * np.exp(change)
         if world.amplitude_drift:
             amplitude += world.amplitude_drift * float(draw("amplitude drift").standard_normal())
+        changed = with_touches(drifted, Cover(forward.mesh).change(touches))
         return np.array([untouched, amplitude * forward.voltages(changed, contact)])
 
     def _field(self, at_mm: np.ndarray, draw: np.random.Generator) -> np.ndarray:

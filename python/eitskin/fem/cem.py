@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from eitskin.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
 from eitskin.errors import ProtocolError, UsageError, missing_extra
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.patterns import Patterns, patterns_for
@@ -76,14 +76,36 @@ class System:
     def matrix(self, conductivity: AnyArray, impedance: AnyArray) -> csc_matrix:
         """Return the symmetric matrix, (size, size) in S. It is positive definite if all values are
         real."""
+        return self._with(self._values(conductivity, impedance))
+
+    def matrix_with(
+        self, conductivity: AnyArray, impedance: AnyArray, unknowns: IntArray, added: AnyArray
+    ) -> csc_matrix:
+        """Return the matrix of ``conductivity``, to which the small matrices ``added`` (e, k, k) on
+        ``unknowns`` (e, k) of elements are added."""
+        values = self._values(conductivity, impedance)
+        rows, columns = np.broadcast_arrays(unknowns[:, :, None], unknowns[:, None, :])
+        free = (rows < self.size) & (columns < self.size)
+        column_of_value = np.repeat(np.arange(self.size), np.diff(self.indptr))
+        stored = column_of_value * self.size + self.indices
+        place = np.searchsorted(stored, columns[free] * self.size + rows[free])
+        np.add.at(values, place, added[free])
+        return self._with(values)
+
+    def _values(self, conductivity: AnyArray, impedance: AnyArray) -> AnyArray:
         admittance = np.divide(1.0, impedance, out=np.zeros_like(impedance), where=~self.shunted)
-        values = self.filling @ np.concatenate([conductivity, admittance])
+        return np.asarray(self.filling @ np.concatenate([conductivity, admittance]))
+
+    def _with(self, values: AnyArray) -> csc_matrix:
         return csc_matrix((values, self.indices, self.indptr), shape=(self.size, self.size))
 
 
 class ForwardModel:
     """Calculates the boundary voltages of a skin for any conductivity of the mesh's elements. The
     sparsity pattern is made only once.
+
+    A conductivity is one number; one for each element, (E,); or a symmetric tensor for each
+    element, (E, 3), in the order xx, yy, xy.
 
     ``contact_impedance_ohm_m2`` is one number or (L,); None takes the skin's value. ``counters``
     counts the work done.
@@ -122,8 +144,7 @@ class ForwardModel:
         conductivity_s_per_m: npt.ArrayLike,
         contact_impedance_ohm_m2: npt.ArrayLike | None = None,
     ) -> Solution:
-        """Solve every pattern with a single factorisation. The conductivities are (E,), or one
-        number for all elements.
+        """Solve every pattern with a single factorisation.
 
         ``contact_impedance_ohm_m2`` replaces the model's values for this call; a different set of
         zero impedances needs a new sparsity pattern.
@@ -136,7 +157,7 @@ class ForwardModel:
         currents = self.patterns.right_hand_sides(len(impedance))
         right_sides = np.zeros((system.size + 1, currents.shape[1]))
         right_sides[system.unknown[n_nodes:]] = currents
-        factors = factorise(system.matrix(conductivity, impedance))
+        factors = factorise(self.matrix(system, conductivity, impedance))
         potentials = np.zeros_like(right_sides)
         potentials[: system.size] = factors.solve(right_sides[: system.size])
         self.counters.factorisations += 1
@@ -169,14 +190,42 @@ class ForwardModel:
         conductivity = np.asarray(given, dtype=np.float64)
         if conductivity.ndim == 0:
             conductivity = np.full(self.mesh.n_elements, float(conductivity))
-        if conductivity.shape != (self.mesh.n_elements,):
+        count = self.mesh.n_elements
+        if conductivity.shape not in ((count,), (count, 3)):
             raise UsageError(
                 f"forward model: conductivity of shape {conductivity.shape} for"
-                f" {self.mesh.n_elements} elements; give one value for each element or one for all"
+                f" {count} elements; give one value for each element or one for all, or"
+                " a tensor (xx, yy, xy) for each element"
             )
-        if not (conductivity.min() > 0 and conductivity.max() < np.inf):
+        least, most = conductivity, conductivity
+        if conductivity.ndim == 2:
+            mean, off = mean_and_deviation(conductivity)
+            least, most = mean - np.abs(off), mean + np.abs(off)
+        if not (least.min() > 0 and most.max() < np.inf):
             raise UsageError("forward model: every conductivity must be finite and above 0 S/m")
         return conductivity
+
+    def matrix(self, system: System, conductivity: AnyArray, impedance: AnyArray) -> csc_matrix:
+        """Return the matrix of ``system`` for conductivities (E,) or (E, 3), real or complex, and
+        contact impedances (L,)."""
+        if conductivity.ndim == 1:
+            return system.matrix(conductivity, impedance)
+        mean = (conductivity[:, 0] + conductivity[:, 1]) / 2
+        uneven = np.flatnonzero(
+            (conductivity[:, 0] != conductivity[:, 1]) | (conductivity[:, 2] != 0)
+        )
+        rest = conductivity[uneven] - mean[uneven, None] * np.array([1.0, 1.0, 0.0])
+        unknowns = system.unknown[self.mesh.triangles[uneven]]
+        return system.matrix_with(mean, impedance, unknowns, self.element_matrices(uneven, rest))
+
+    def element_matrices(self, elements: IntArray, conductivity: AnyArray) -> AnyArray:
+        """Return the matrices (e, 3, 3) in S of ``elements`` (e,) with tensors (e, 3)."""
+        x, y = np.moveaxis(self.gradients_per_m[elements], 2, 0)
+        xx, yy, xy = (conductivity[:, k, None] for k in range(3))
+        along_x, along_y = xx * x + xy * y, xy * x + yy * y
+        products = x[:, :, None] * along_x[:, None, :] + y[:, :, None] * along_y[:, None, :]
+        volumes_m3 = self.mesh.areas_mm2[elements] * (1e-6 * self.thickness_m)
+        return np.asarray(products * volumes_m3[:, None, None])
 
     def _make_system(self, shunted: BoolArray) -> System:
         self.counters.patterns += 1
@@ -200,10 +249,23 @@ def factorise(matrix: csc_matrix) -> Any:
 
 def shape_gradients(mesh: Mesh) -> FloatArray:
     """Return the gradients of the three hat functions of each triangle, (E, 3, 2) in 1/m."""
-    corners = mesh.nodes_mm[mesh.triangles]
-    opposite = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)
+    return 1e3 * hat_gradients(mesh.nodes_mm[mesh.triangles])
+
+
+def hat_gradients(corners_mm: FloatArray) -> FloatArray:
+    """Return the gradients of the three hat functions of triangles with these corners (e, 3, 2),
+    (e, 3, 2) in 1/mm."""
+    opposite = np.roll(corners_mm, 1, axis=1) - np.roll(corners_mm, -1, axis=1)
     turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
-    return np.asarray(turned * (1e3 / (2 * mesh.areas_mm2))[:, None, None])
+    doubled = opposite[:, 0, 0] * opposite[:, 1, 1] - opposite[:, 0, 1] * opposite[:, 1, 0]
+    return np.asarray(turned / doubled[:, None, None])
+
+
+def mean_and_deviation(tensor: FloatArray) -> tuple[FloatArray, ComplexArray]:
+    """Return the mean (e,) of the two principal values of symmetric tensors (e, 3), and half their
+    difference times the squared direction of the greater one as a complex number, (e,)."""
+    xx, yy, xy = np.moveaxis(tensor, -1, 0)
+    return (xx + yy) / 2, (xx - yy) / 2 + 1j * xy
 
 
 def _checked_impedance(given: npt.ArrayLike, count: int) -> FloatArray:

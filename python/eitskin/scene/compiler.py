@@ -16,7 +16,7 @@ from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.config import from_table
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
-from eitskin.scene.cover import Cover
+from eitskin.scene.cover import NO_CHANGE, Change, Cover
 from eitskin.scene.deformation import FLAT, Deformation, one_after_another
 from eitskin.scene.description import Scene
 from eitskin.scene.effect import (
@@ -31,7 +31,7 @@ from eitskin.scene.effect import (
     Step,
     VoltageStep,
 )
-from eitskin.scene.forward_steps import Change, UpdateCost, count_costs, touched_unknowns
+from eitskin.scene.forward_steps import UpdateCost, count_costs, touched_unknowns
 from eitskin.scene.motion import Mix, Motion
 from eitskin.scene.plan import ScenePlan, make_plan
 from eitskin.scene.random_touches import TrueTouch
@@ -42,8 +42,6 @@ from eitskin.scene.touch_path import touches_at
 from eitskin.skin.skin import Skin, size_to_paper
 
 VoltageFunction: TypeAlias = Callable[[AnyArray, Loads, float, int], AnyArray]
-
-NO_CHANGE = Change(np.zeros(0, np.int64), np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +65,7 @@ class States:
         self._varying = [s for s in steps if isinstance(s, MaterialStep) and s.varies]
         self._deforming = [s for s in steps if isinstance(s, DeformationStep)]
         self._contacts = _contacts(scene, steps, frames)
-        self._changes: dict[tuple[TrueTouch, ...], Change] = {(): NO_CHANGE}
+        self._changes: dict[tuple[tuple[TrueTouch, ...], Deformation], Change] = {}
         self._number: dict[Any, int] = {}
         self.all: list[State] = []
         self.motion = Motion(scene.touches, size_to_paper(scene.skin.outline))
@@ -84,15 +82,19 @@ class States:
         key = (touches, contact_key(contact), sheet, deformation)
         if key not in self._number:
             self._number[key] = len(self.all)
-            change = self.change(touches)
+            change = self.change(touches, deformation)
             self.all.append(State(touches, change, contact, frame, deformation))
         return self._number[key]
 
-    def change(self, touches: tuple[TrueTouch, ...]) -> Change:
-        """Return how ``touches`` change the conductivity."""
-        if touches not in self._changes:
-            self._changes[touches] = Change(*self._cover.factor(touches))
-        return self._changes[touches]
+    def change(self, touches: tuple[TrueTouch, ...], deformation: Deformation = FLAT) -> Change:
+        """Return how ``touches`` change the conductivity of the deformed skin."""
+        if not touches:
+            return NO_CHANGE
+        key = touches, deformation
+        if key not in self._changes:
+            matrix = None if deformation == FLAT else deformation.matrix
+            self._changes[key] = self._cover.change(touches, matrix)
+        return self._changes[key]
 
     def mix(self, frame: int, times_s: FloatArray) -> Mix:
         """Return the states of ``frame``'s rows at their instants (m,)."""

@@ -1,16 +1,57 @@
-"""Compute which elements of a mesh a touch covers, and which part of each."""
+"""Compute which elements of a mesh touches cover, and how they change the conductivity of each.
 
-from collections.abc import Iterable
+The mean conductivity of an element that the edge of a touch cuts makes the touch too large: at
+11,000 elements a frame is 8 to 12 % off. In an immersed finite element (Li, Lin and Wu, Numer.
+Math. 96, 2003) the potential has a kink on the edge, such that the current through the edge and the
+voltage along it are continuous. With linear functions, this is an ordinary element with a tensor as
+its conductivity. For a conductivity that depends only on the distance d along the edge's normal n,
+
+    W = sum_i grad N_i Phi(d_i),  dPhi/dd = 1 / sigma,  M = 1 - W n' / (n'W)
+    tensor = mean(sigma) M'M + mean(1 / sigma) n n' / (n'W)^2
+
+where N_i are the hat functions and d_i the distances of the corners. W = mean(1 / sigma) n is a
+mixture of thin layers: the arithmetic mean along them, and the harmonic mean across. It is used for
+smooth profiles, for elements that several touches share, and for insulating touches, where it is
+better. tests/python/scene/test_cut_elements.py states the errors.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from eitskin.arrays import FloatArray, IntArray
+from eitskin.arrays import BoolArray, FloatArray, IntArray
+from eitskin.fem.cem import hat_gradients
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.shaped_touch import centres_of_parts
 from eitskin.scene.random_touches import TrueTouch
 
 SUBDIVISION = 8
 MIN_FACTOR = 1e-3
+ISOTROPIC = np.array([1.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """The elements (e,), ascending, whose conductivity touches multiply by ``tensor`` (e, 3), in
+    the order xx, yy, xy; ``mean`` (e,) is the mean factor over the area of each element."""
+
+    elements: IntArray
+    mean: FloatArray
+    tensor: FloatArray
+
+
+NO_CHANGE = Change(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 3)))
+
+
+def with_touches(background: FloatArray, change: Change) -> FloatArray:
+    """Return the conductivity of a skin with ``background`` (E,) and touches: (E, 3), or (E,)
+    without touches."""
+    if not len(change.elements):
+        return background
+    conductivity = background[:, None] * ISOTROPIC
+    conductivity[change.elements] = background[change.elements, None] * change.tensor
+    return np.asarray(conductivity)
 
 
 class Cover:
@@ -31,29 +72,103 @@ class Cover:
         """Return the elements (e,) that ``touch`` meets, ascending, and the covered part of each
         (e,), in (0, 1]. For a shape this is its mean change in the element relative to that in its
         middle."""
-        centre = np.array([touch.x_mm, touch.y_mm])
-        reach_mm = touch.radius_mm * (1.0 if touch.shape is None else touch.shape.reach)
-        near = np.flatnonzero(
-            np.linalg.norm(self._middles - centre, axis=1) <= reach_mm + self._reach
-        )
-        offsets = self._weights @ self._corners[near] - centre
-        if touch.shape is None:
-            part = ((offsets**2).sum(axis=2) <= touch.radius_mm**2).mean(axis=1)
-        else:
-            x, y = offsets[..., 0], offsets[..., 1]
-            part = touch.shape.change_at(x, y, touch.radius_mm).mean(axis=1)
+        near = self._near(touch)
+        part = touch.change_at(self._weights @ self._corners[near]).mean(axis=1)
         met = part > 0
         return near[met], part[met]
 
-    def factor(self, touches: Iterable[TrueTouch]) -> tuple[IntArray, FloatArray]:
-        """Return the elements (e,) that ``touches`` meet, ascending, and the factor of each one's
-        conductivity (e,).
+    def change(self, touches: Iterable[TrueTouch], deformation: FloatArray | None = None) -> Change:
+        """Return how ``touches`` change the conductivity. On a skin that is deformed by the matrix
+        ``deformation`` (2, 2), touches move with the material.
 
-        If touches share an element, their changes add; the factor is at least a thousandth.
+        If touches share an element, their changes add; the factor is at least a thousandth
+        everywhere.
         """
-        change = np.zeros(len(self._middles))
-        for touch in touches:
-            elements, part = self.of(touch)
-            change[elements] += part * (touch.contrast - 1.0)
-        elements = np.flatnonzero(change)
-        return elements, np.maximum(1.0 + change[elements], MIN_FACTOR)
+        given = [touch for touch in touches if touch.contrast != 1.0]
+        near = [self._near(touch) for touch in given]
+        if not sum(map(len, near)):
+            return NO_CHANGE
+        elements = np.unique(np.concatenate(near))
+        places = [np.searchsorted(elements, own) for own in near]
+        sigma, normal, sharp = self._inside(elements, given, places)
+        met = np.flatnonzero((sigma != 1.0).any(axis=1))
+        elements, sigma, normal = elements[met], sigma[met], normal[met]
+        corners = self._corners[elements]
+        if deformation is not None:
+            corners, normal = corners @ deformation.T, normal @ np.linalg.inv(deformation)
+        normal = _unit(normal)
+        tensor = _tensors(corners, sigma, normal, sharp[met])
+        return Change(elements, sigma.mean(axis=1), tensor)
+
+    def _near(self, touch: TrueTouch) -> IntArray:
+        """Return the elements (e,) that ``touch`` may meet, ascending."""
+        away = np.hypot(self._middles[:, 0] - touch.x_mm, self._middles[:, 1] - touch.y_mm)
+        return np.flatnonzero(away <= touch.reach_mm + self._reach)
+
+    def _inside(
+        self, elements: IntArray, touches: Sequence[TrueTouch], places: Sequence[IntArray]
+    ) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Return the factor at the points of each of ``elements`` (e, s), the direction in which it
+        grows most (e, 2), and whether one touch alone varies within the element and conducts better
+        than the skin (e,). ``places`` are those of the elements near each touch."""
+        points, middles = self._weights @ self._corners[elements], self._middles[elements]
+        sigma, edges = np.ones(points.shape[:2]), np.zeros(len(elements), np.int64)
+        normal, most = np.zeros((len(elements), 2)), np.zeros(len(elements))
+        conducts = np.zeros(len(elements), np.bool_)
+        for touch, near in zip(touches, places, strict=True):
+            own = (touch.contrast - 1.0) * touch.change_at(points[near])
+            sigma[near] += own
+            step = np.ptp(own, axis=1)
+            edges[near] += step > 0
+            wins = near[step > most[near]]
+            most[near] = np.maximum(most[near], step)
+            conducts[wins] = touch.contrast > 1
+            normal[wins] = np.sign(1.0 - touch.contrast) * touch.outward(middles[wins])
+        return np.maximum(sigma, MIN_FACTOR), normal, conducts & (edges == 1)
+
+
+def _tensors(
+    corners: FloatArray, sigma: FloatArray, normal: FloatArray, sharp: BoolArray
+) -> FloatArray:
+    """Return the tensors (e, 3) of elements with these corners (e, 3, 2), factors at points of
+    equal area (e, s), and directions (e, 2) in which the factor grows.
+
+    A ``sharp`` element (e,) with two conductivities has the edge as a straight line at the place
+    that gives both their areas. Every other one is a mixture of thin layers.
+    """
+    low, high = sigma.min(axis=1), sigma.max(axis=1)
+    mean, resistance = sigma.mean(axis=1), (1 / sigma).mean(axis=1)
+    kink = resistance[:, None] * normal
+    is_low = sigma == low[:, None]
+    cut = np.flatnonzero(sharp & (is_low | (sigma == high[:, None])).all(axis=1))
+    away = (corners[cut] * normal[cut, None]).sum(axis=2)
+    away -= _line(away, is_low[cut].mean(axis=1))[:, None]
+    potential = away / np.where(away < 0, low[cut, None], high[cut, None])
+    bent = (hat_gradients(corners[cut]) * potential[:, :, None]).sum(axis=1)
+    across = (bent * normal[cut]).sum(axis=1)
+    # an obtuse element can leave this range; the formula then has no meaning
+    good = (across >= 1 / high[cut]) & (across <= 1 / low[cut])
+    kink[cut[good]] = bent[good]
+    across = (kink * normal).sum(axis=1)
+    # M turns a field into one along the edge, so M'M and n n' are squares of two vectors
+    edge = np.column_stack([-normal[:, 1], normal[:, 0]])
+    through = normal / across[:, None]
+    along = edge - (kink * edge).sum(axis=1)[:, None] * through
+    of_along, of_through = (v[:, [0, 1, 0]] * v[:, [0, 1, 1]] for v in (along, through))
+    return np.asarray(mean[:, None] * of_along + resistance[:, None] * of_through)
+
+
+def _line(away: FloatArray, share: FloatArray) -> FloatArray:
+    """Return the distance (e,) below which ``share`` (e,) of the area of triangles lies whose
+    corners have the distances ``away`` (e, 3)."""
+    first, second, third = np.sort(away, axis=1).T
+    whole = third - first
+    rising = first + np.sqrt(share * (second - first) * whole)
+    falling = third - np.sqrt((1 - share) * (third - second) * whole)
+    return np.asarray(np.where(share * whole <= second - first, rising, falling))
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    """Return ``vectors`` (e, 2) with length 1; one without direction becomes (1, 0)."""
+    length = np.hypot(vectors[:, 0], vectors[:, 1])[:, None]
+    return np.where(length > 0, vectors / np.where(length > 0, length, 1.0), [1.0, 0.0])

@@ -18,7 +18,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from eitskin.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from eitskin.fem.cem import ForwardModel, System, factorise
+from eitskin.fem.cem import ForwardModel, System, factorise, mean_and_deviation
+from eitskin.scene.cover import ISOTROPIC, Change, with_touches
 from eitskin.scene.effect import PhaseStep
 
 # The cost of ordering and symbolic analysis, in multiplications per stored value of the matrix.
@@ -37,14 +38,6 @@ class Work:
     updates: int = 0
 
 
-@dataclass(frozen=True, eq=False)
-class Change:
-    """The elements (e,) whose conductivity the touches of a state multiply by ``factor`` (e,)."""
-
-    elements: IntArray
-    factor: FloatArray
-
-
 class Forward(Protocol):
     """Calculates the potentials of the electrodes (L, P) in V per A for each pattern of the model,
     with zero mean."""
@@ -55,13 +48,6 @@ class Forward(Protocol):
         """Return the potentials for a skin with conductivity ``background`` (E,) in S/m, a
         ``change``, and contact impedances (L,)."""
         ...
-
-
-def touched(background: FloatArray, change: Change) -> FloatArray:
-    """Return the conductivity (E,) including the touches."""
-    conductivity = background.copy()
-    conductivity[change.elements] *= change.factor
-    return conductivity
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +62,7 @@ class Factorise:
     ) -> AnyArray:
         """Return the potentials, as in :class:`Forward`."""
         before = self.model.counters.solves
-        solution = self.model.solve(touched(background, change), impedance_ohm_m2)
+        solution = self.model.solve(with_touches(background, change), impedance_ohm_m2)
         self.work.factorisations += 1
         self.work.solves += self.model.counters.solves - before
         return solution.electrodes
@@ -97,8 +83,8 @@ class FactoriseComplex:
         """Return the complex potentials, as in :class:`Forward`."""
         impedance = self.phase.contact(impedance_ohm_m2)
         system = self.model.system_for(np.asarray(impedance == 0))
-        admittivity = self.phase.admittivity(touched(background, change))
-        factors = factorise(system.matrix(admittivity, impedance))
+        admittivity = _admittivity(self.phase, with_touches(background, change))
+        factors = factorise(self.model.matrix(system, admittivity, impedance))
         currents = _right_hand_sides(self.model, system).astype(np.complex128)
         self.work.complex_factorisations += 1
         self.work.factorisations += 1
@@ -139,11 +125,9 @@ class Update:
         if not len(change.elements):
             return _zero_mean(self._base_electrodes)
         elements = change.elements
-        values = self._admittivity(touched(background, change)) - self._base_values
-        stiffness = self._stiffness[elements]
-        unknowns, dense = _dense_change(
-            self.model, self._system, stiffness, elements, values[elements]
-        )
+        values = _admittivity(self.phase, with_touches(background, change))[elements]
+        values = values - self._base_values[elements, None] * ISOTROPIC
+        unknowns, dense = _dense_change(self.model, self._system, elements, values)
         if not np.isin(unknowns, self.reach).all():
             self.reach = np.union1d(self.reach, unknowns)
             self._solve_base()
@@ -155,22 +139,18 @@ class Update:
         to_electrodes = self._columns[place][:, len(self.reach) :].T
         return _zero_mean(self._base_electrodes - to_electrodes @ (dense @ inner))
 
-    def _admittivity(self, conductivity: FloatArray) -> AnyArray:
-        return conductivity if self.phase is None else self.phase.admittivity(conductivity)
-
     def _factorise_base(self, background: FloatArray, impedance_ohm_m2: FloatArray) -> None:
         model = self.model
         impedance: AnyArray = (
             impedance_ohm_m2 if self.phase is None else self.phase.contact(impedance_ohm_m2)
         )
         self._system = system = model.system_for(np.asarray(impedance == 0))
-        self._base_values = self._admittivity(background)
+        self._base_values = _admittivity(self.phase, background)
         if self._factors is None:
             self._factors = factorise(system.matrix(self._base_values, impedance))
             self.work.factorisations += 1
             self.work.complex_factorisations += int(self.phase is not None)
         self._dtype = np.result_type(self._base_values, impedance)
-        self._stiffness = model.element_stiffness()
         self._solve_base()
         self._ready = True
 
@@ -204,6 +184,22 @@ class Update:
                 self._known[place] = True
 
 
+def _admittivity(phase: PhaseStep | None, conductivity: FloatArray) -> AnyArray:
+    """Return the admittivity that belongs to a conductivity (E,) or tensors (E, 3): a tensor's
+    principal directions stay, and its principal values are converted."""
+    if phase is None:
+        return conductivity
+    if conductivity.ndim == 1:
+        return phase.admittivity(conductivity)
+    mean, off = mean_and_deviation(conductivity)
+    half = np.abs(off)
+    greater, lesser = phase.admittivity(mean + half), phase.admittivity(mean - half)
+    towards = off / np.where(half > 0, half, 1.0)
+    middle, most = (greater + lesser) / 2, (greater - lesser) / 2
+    cos, sin = towards.real, towards.imag
+    return np.column_stack([middle + most * cos, middle - most * cos, most * sin])
+
+
 def _right_hand_sides(model: ForwardModel, system: System) -> FloatArray:
     currents = model.patterns.right_hand_sides(len(system.shunted))
     sides = np.zeros((system.size + 1, currents.shape[1]))
@@ -216,15 +212,17 @@ def _zero_mean(electrodes: AnyArray) -> AnyArray:
 
 
 def _dense_change(
-    model: ForwardModel, system: System, stiffness: FloatArray, elements: IntArray, values: AnyArray
+    model: ForwardModel, system: System, elements: IntArray, values: AnyArray
 ) -> tuple[IntArray, AnyArray]:
-    """Return the unknowns (k,) under ``elements``, ascending, and the change of the matrix on them
-    (k, k)."""
+    """Return the unknowns (k,) under ``elements`` (e,), ascending, and the change of the matrix on
+    them (k, k) for changes of the conductivity ``values`` (e, 3)."""
     places = system.unknown[model.mesh.triangles[elements]]
     unknowns, local = np.unique(places, return_inverse=True)
     local = local.reshape(places.shape)
     dense = np.zeros((len(unknowns), len(unknowns)), dtype=values.dtype)
-    np.add.at(dense, (local[:, :, None], local[:, None, :]), stiffness * values[:, None, None])
+    np.add.at(
+        dense, (local[:, :, None], local[:, None, :]), model.element_matrices(elements, values)
+    )
     free = unknowns < system.size
     return unknowns[free], dense[np.ix_(free, free)]
 

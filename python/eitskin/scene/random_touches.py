@@ -51,6 +51,24 @@ class TrueTouch:
             return np.asarray(x_mm**2 + y_mm**2 <= self.radius_mm**2)
         return np.asarray(self.shape.rho2(x_mm, y_mm, self.radius_mm) <= 1)
 
+    @property
+    def reach_mm(self) -> float:
+        """The greatest distance from the centre at which it changes anything."""
+        return self.radius_mm * (1.0 if self.shape is None else self.shape.reach)
+
+    def change_at(self, points_mm: FloatArray) -> FloatArray:
+        """Return the change at ``points_mm`` (..., 2) relative to that in the middle, (...)."""
+        x_mm, y_mm = points_mm[..., 0] - self.x_mm, points_mm[..., 1] - self.y_mm
+        if self.shape is None:
+            return self.covers(x_mm, y_mm).astype(np.float64)
+        return self.shape.change_at(x_mm, y_mm, self.radius_mm)
+
+    def outward(self, points_mm: FloatArray) -> FloatArray:
+        """Return the directions, of any length, in which the change falls off at ``points_mm`` (k,
+        2), (k, 2)."""
+        offsets = points_mm - np.array([self.x_mm, self.y_mm])
+        return offsets if self.shape is None else self.shape.outward(offsets)
+
     def rim_mm(self) -> FloatArray:
         """Return points (64, 2) on the edge."""
         if self.shape is not None:

@@ -17,7 +17,7 @@ from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.frames.frames import Frames
 from eitskin.progress import Progress, silent
-from eitskin.scene.cover import Cover
+from eitskin.scene.cover import Cover, with_touches
 from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.streams import stream
 from eitskin.skin.protocol import Protocol
@@ -135,16 +135,13 @@ class Simulated:
 
 
 def conductivity_with(mesh: Mesh, touches: Iterable[TrueTouch], sheet_s_per_m: float) -> FloatArray:
-    """Return the conductivity (E,) in S/m of a skin with touches: the mean over the area of each
-    element.
+    """Return the conductivity in S/m of a skin with touches as ``ForwardModel`` takes it: (E, 3),
+    or (E,) without touches.
 
     Touches are assumed to lie apart; if they overlap, their changes add (at least a thousandth of
     the skin's conductivity remains).
     """
-    conductivity = np.full(mesh.n_elements, float(sheet_s_per_m))
-    elements, factor = Cover(mesh).factor(touches)
-    conductivity[elements] *= factor
-    return conductivity
+    return with_touches(np.full(mesh.n_elements, float(sheet_s_per_m)), Cover(mesh).change(touches))
 
 
 def simulate(

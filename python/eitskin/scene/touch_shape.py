@@ -63,6 +63,13 @@ class TouchShape:
             return np.where(rho2 <= GAUSS_REACH**2, np.exp2(-rho2), 0.0)
         return np.asarray((rho2 <= 1.0).astype(np.float64))
 
+    def outward(self, offsets_mm: FloatArray) -> FloatArray:
+        """Return the directions, of any length, in which rho grows at ``offsets_mm`` (k, 2) from
+        the middle, (k, 2)."""
+        angle = math.radians(self.angle_deg)
+        axes = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+        return np.asarray((offsets_mm @ axes.T) * [1 / self.aspect, self.aspect] @ axes)
+
     def rim_mm(self, radius_mm: float) -> FloatArray:
         """Return points (64, 2) on the ellipse, relative to the middle."""
         angle, root = math.radians(self.angle_deg), math.sqrt(self.aspect)

@@ -14,7 +14,6 @@ from eitskin.fem.sensitivity import element_to_pixel
 from eitskin.frames.paths import Paths
 from eitskin.scene.compiler import Compiled, State, background_of
 from eitskin.scene.description import Scene
-from eitskin.scene.forward_steps import touched
 from eitskin.scene.laws import ShortCircuit
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.touch_path import sample, touches_at
@@ -122,9 +121,9 @@ def _rasters(
     images = np.zeros((len(used), grid.ny, grid.nx), dtype=np.float32)
     for k, state in enumerate(states[number] for number in used):
         masks[k] = mask_of(state.touches, x_mm, y_mm)
-        values = (
-            share @ touched(background(state), state.change) / np.where(total > 0, total, np.nan)
-        )
+        conductivity = background(state).copy()
+        conductivity[state.change.elements] *= state.change.mean
+        values = share @ conductivity / np.where(total > 0, total, np.nan)
         images[k] = grid.image(values)
     extent = (x0, y0, x0 + grid.nx * grid.pixel_mm, y0 + grid.ny * grid.pixel_mm)
     return masks[which], images[which], extent

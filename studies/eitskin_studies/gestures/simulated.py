@@ -19,7 +19,7 @@ from eitskin.fileio import write_beside
 from eitskin.model.model import Model
 from eitskin.model.options import default_options, tracking
 from eitskin.scene.cover import Cover
-from eitskin.scene.forward_steps import Change, Update, Work
+from eitskin.scene.forward_steps import Update, Work
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.scene.streams import stream
 from eitskin.scene.touch_path import sample, touches_at
@@ -81,8 +81,8 @@ class Simulator:
         samples = [sample(track, times) for track in session.tracks]
         states = np.empty((len(times), protocol.n_rows))
         for k in range(len(times)):
-            elements, factor = self._cover.factor(touches_at(samples, k))
-            solved = solver.electrodes(sheet, Change(elements, factor), contact)
+            change = self._cover.change(touches_at(samples, k))
+            solved = solver.electrodes(sheet, change, contact)
             states[k] = forward.patterns.voltages(solved) * protocol.current_a
         untouched = forward.voltages(sheet)
         return np.vstack([untouched, _scanned(states, frames)])

@@ -22,7 +22,7 @@ from eitskin.fem.deform import MeshDeformation
 from eitskin.fem.mesh import Mesh, mesh_for_elements
 from eitskin.fileio import write_beside
 from eitskin.progress import Progress, silent
-from eitskin.scene.cover import Cover
+from eitskin.scene.cover import Cover, with_touches
 from eitskin.scene.random_field import random_field
 from eitskin.scene.random_touches import TouchScene, TrueTouch, rim_distance_mm
 from eitskin.scene.simulate import Measurement, measure
@@ -174,16 +174,15 @@ class WorldFactory:
         if errors.uneven:
             sheet *= np.exp(errors.uneven * self._field(errors, middles, draw("uneven")))
         untouched = forward.voltages(sheet, contact)
-        elements, factors = Cover(forward.mesh).factor(touches)
-        changed, amplitude = sheet.copy(), 1.0
-        changed[elements] *= factors
+        drifted, amplitude = sheet.copy(), 1.0
         if errors.drift:
-            changed *= np.exp(errors.drift * self._field(errors, middles, draw("drift")))
+            drifted *= np.exp(errors.drift * self._field(errors, middles, draw("drift")))
         if errors.contact_drift:
             change = errors.contact_drift * draw("contact drift").standard_normal(len(contact))
             contact = contact * np.exp(change)
         if errors.amplitude_drift:
             amplitude += errors.amplitude_drift * float(draw("amplitude drift").standard_normal())
+        changed = with_touches(drifted, Cover(forward.mesh).change(touches))
         return np.array([untouched, amplitude * forward.voltages(changed, contact)])
 
     def _field(self, errors: Errors, at_mm: FloatArray, draw: np.random.Generator) -> FloatArray:

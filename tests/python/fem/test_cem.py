@@ -5,8 +5,8 @@ from math import pi
 
 import numpy as np
 import pytest
-from disk_series import DWARFING_IMPEDANCE_OHM_M2, exact_voltages, polar_mesh
 
+from disk_series import DWARFING_IMPEDANCE_OHM_M2, exact_voltages, polar_mesh
 from eitskin.arrays import FloatArray
 from eitskin.errors import ProtocolError, UsageError
 from eitskin.fem.cem import Counters, ForwardModel

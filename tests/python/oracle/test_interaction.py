@@ -1,16 +1,14 @@
-"""What touches do to each other: the formula against fields that are solved."""
+"""What touches do to each other: the formula against the exact model."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from eitskin.fem.cem import ForwardModel
-from eitskin.fem.mesh import mesh_for_elements
 from eitskin.model.reduction import fold_rows
 from eitskin.oracle.discs import Disc, interaction
+from eitskin.oracle.round_skin import RoundSkin
 from eitskin.scene.random_touches import TrueTouch
-from eitskin.scene.simulate import conductivity_with
 from eitskin.skin.skin import paper_skin
 from small_models import prebuilt
 
@@ -24,20 +22,19 @@ def test_two_touches_differ_from_the_sum_of_each_by_the_interaction(middle, turn
     1) of the sheet's."""
     skin, model = paper_skin(), prebuilt()[0]
     sheet, fold = skin.conductivity_s_per_m, model.fold
-    forward = ForwardModel(mesh_for_elements(skin, 11_000), skin, model.protocol)
+    exact = RoundSkin(skin, model.protocol)
     off = 18 * np.array([np.cos(turn), np.sin(turn)])
     places = [tuple(map(float, middle + side * off)) for side in (-1, 1)]
     touches = [TrueTouch(*place, 9.0, 5.0) for place in places]
     alone_v, one_v, other_v, both_v = (
-        forward.voltages(conductivity_with(forward.mesh, some, sheet))
-        for some in ([], touches[:1], touches[1:], touches)
+        exact.voltages(some) for some in ([], touches[:1], touches[1:], touches)
     )
     second_v = both_v - one_v - other_v + alone_v
     second_order = fold_rows(second_v, fold)
     change = 2 * 4 / 6 * sheet
     predicted = interaction(model, [Disc(*place, 9.0, change) for place in places])
     left = np.linalg.norm(second_order - predicted) / np.linalg.norm(second_order)
-    assert left < 0.2, f"the interaction leaves {left:.2f} of it"
+    assert left < 0.23, f"the interaction leaves {left:.2f} of it"
 
 
 def test_far_apart_and_alone():

@@ -41,9 +41,9 @@ def _scene(*touches: dict[str, Any], **head: Any) -> Scene:
     ],
 )
 def test_a_shape_changes_its_share_of_the_discs_area(mesh, shape, share):
-    elements, factor = Cover(mesh).factor([TrueTouch(5.0, -12.0, 12.0, 4.0, shape)])
-    change = (factor - 1) / 3
-    area_mm2 = float((change * mesh.areas_mm2[elements]).sum())
+    found = Cover(mesh).change([TrueTouch(5.0, -12.0, 12.0, 4.0, shape)])
+    change = (found.mean - 1) / 3
+    area_mm2 = float((change * mesh.areas_mm2[found.elements]).sum())
     assert area_mm2 == pytest.approx(share * math.pi * 144, rel=0.01)
     assert change.max() <= 1 + 1e-12
 

@@ -19,7 +19,7 @@ from eitskin.fem.sensitivity import element_fields
 from eitskin.model.model import Model
 from eitskin.oracle.discs import Disc, DiscFit
 from eitskin.oracle.engine import OracleEngine
-from eitskin.scene.cover import Cover
+from eitskin.scene.cover import ISOTROPIC, Cover, with_touches
 from eitskin.scene.random_touches import TouchScene, TrueTouch
 from eitskin.scoring.matching import GATE_MM, match
 from eitskin.skin.protocol import Protocol
@@ -123,10 +123,8 @@ class Truthful:
             TrueTouch(float(x), float(y), float(radius), contrast)
             for (x, y, radius), contrast in zip(parameters.reshape(-1, 3), contrasts, strict=True)
         ]
-        touched, factor = self._cover.factor(discs)
-        conductivity = np.full(self._mesh.n_elements, self._sheet)
-        conductivity[touched] *= factor
-        solution = self._forward.solve(conductivity)
+        sheet = np.full(self._mesh.n_elements, self._sheet)
+        solution = self._forward.solve(with_touches(sheet, self._cover.change(discs)))
         fields, patterns = element_fields(self._forward, solution), self._forward.patterns
         scale = (
             -self._forward.protocol.current_a
@@ -138,16 +136,11 @@ class Truthful:
         for disc in discs:
             for name in ("x_mm", "y_mm", "radius_mm"):
                 change = self._edge(disc, name)
-                mine = np.flatnonzero(change)
-                weight = (
-                    change[mine]
-                    * (disc.contrast - 1)
-                    * self._sheet
-                    * self._mesh.areas_mm2[mine]
-                    * 1e-6
-                )
+                mine = np.flatnonzero(change.any(axis=1))
+                weight = self._sheet * self._mesh.areas_mm2[mine] * 1e-6
+                tensors = change[mine][:, [[0, 2], [2, 1]]] * weight[:, None, None]
                 product = np.einsum(
-                    "edp,edq->pq", fields[mine] * weight[:, None, None], fields[mine], optimize=True
+                    "edp,edq->pq", fields[mine], tensors @ fields[mine], optimize=True
                 )
                 slopes.append(scale * product[patterns.drive, patterns.measure])
         answer = self._forward.voltages_of(solution), np.array(slopes).T
@@ -155,14 +148,13 @@ class Truthful:
         return answer
 
     def _edge(self, disc: TrueTouch, name: str) -> FloatArray:
-        """How the part of each element that ``disc`` covers changes with one of its lengths, (E,)
-        1/mm."""
-        change = np.zeros(self._mesh.n_elements)
+        """How the conductivity of each element over the sheet's changes with one of the lengths of
+        ``disc``, (E, 3) 1/mm."""
+        change = np.zeros((self._mesh.n_elements, 3))
         for sign in (1.0, -1.0):
-            elements, part = self._cover.of(
-                replace(disc, **{name: getattr(disc, name) + sign * STEP_MM})
-            )
-            change[elements] += sign * part / (2 * STEP_MM)
+            moved = replace(disc, **{name: getattr(disc, name) + sign * STEP_MM})
+            found = self._cover.change([moved])
+            change[found.elements] += sign * (found.tensor - ISOTROPIC) / (2 * STEP_MM)
         return change
 
 

@@ -12,9 +12,10 @@ from eitskin.arrays import FloatArray
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh
+from eitskin.scene.cover import NO_CHANGE
 from eitskin.scene.effect import Contacts, EffectSession, PhaseStep
 from eitskin.scene.effects import bridged, contact_impedance, detached, phase
-from eitskin.scene.forward_steps import Change, FactoriseComplex, Work
+from eitskin.scene.forward_steps import FactoriseComplex, Work
 from eitskin.scene.reading import OPEN_BRIDGED_OHM_M2, OPEN_OHM_M2
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import polygon
@@ -71,8 +72,7 @@ def test_phase_against_the_circuit_of_a_bar_between_rc_interfaces(make_session, 
     forward = ForwardModel(mesh, skin, protocol, 0.0)
     contacts = np.array([9e5, 9e5, resistance, resistance])
     solver = FactoriseComplex(forward, _only_ends(step), Work())
-    nothing = Change(np.zeros(0, np.int64), np.zeros(0))
-    electrodes = solver.electrodes(np.full(mesh.n_elements, 0.05), nothing, contacts)
+    electrodes = solver.electrodes(np.full(mesh.n_elements, 0.05), NO_CHANGE, contacts)
     v: Any = forward.patterns.voltages(electrodes) * 1e-3
     omega, area_m2 = 2 * pi * hertz, 20e-3 * 5e-3
     admittivity = 0.05 + 1j * omega * 8.8541878128e-12 * 2e4
