@@ -229,14 +229,9 @@ class ForwardModel:
 
     def _make_system(self, shunted: BoolArray) -> System:
         self.counters.patterns += 1
-        return _system(self.mesh, shunted, self.element_stiffness(), self.thickness_m)
-
-    def element_stiffness(self) -> FloatArray:
-        """Return the matrix of each element per unit of conductivity, (E, 3, 3) in m."""
-        x, y = self.gradients_per_m[..., 0], self.gradients_per_m[..., 1]
-        products = x[:, :, None] * x[:, None, :] + y[:, :, None] * y[:, None, :]
-        volumes_m3 = self.mesh.areas_mm2 * (1e-6 * self.thickness_m)
-        return np.asarray(products * volumes_m3[:, None, None])
+        every = np.arange(self.mesh.n_elements)
+        stiffness = self.element_matrices(every, np.tile([1.0, 1.0, 0.0], (len(every), 1)))
+        return _system(self.mesh, shunted, stiffness, self.thickness_m)
 
 
 def factorise(matrix: csc_matrix) -> Any:
@@ -249,16 +244,10 @@ def factorise(matrix: csc_matrix) -> Any:
 
 def shape_gradients(mesh: Mesh) -> FloatArray:
     """Return the gradients of the three hat functions of each triangle, (E, 3, 2) in 1/m."""
-    return 1e3 * hat_gradients(mesh.nodes_mm[mesh.triangles])
-
-
-def hat_gradients(corners_mm: FloatArray) -> FloatArray:
-    """Return the gradients of the three hat functions of triangles with these corners (e, 3, 2),
-    (e, 3, 2) in 1/mm."""
-    opposite = np.roll(corners_mm, 1, axis=1) - np.roll(corners_mm, -1, axis=1)
+    corners = mesh.nodes_mm[mesh.triangles]
+    opposite = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)
     turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
-    doubled = opposite[:, 0, 0] * opposite[:, 1, 1] - opposite[:, 0, 1] * opposite[:, 1, 0]
-    return np.asarray(turned / doubled[:, None, None])
+    return np.asarray(turned * (1e3 / (2 * mesh.areas_mm2))[:, None, None])
 
 
 def mean_and_deviation(tensor: FloatArray) -> tuple[FloatArray, ComplexArray]:

@@ -6,13 +6,13 @@ Math. 96, 2003) the potential has a kink on the edge, such that the current thro
 voltage along it are continuous. With linear functions, this is an ordinary element with a tensor as
 its conductivity. For a conductivity that depends only on the distance d along the edge's normal n,
 
-    W = sum_i grad N_i Phi(d_i),  dPhi/dd = 1 / sigma,  M = 1 - W n' / (n'W)
-    tensor = mean(sigma) M'M + mean(1 / sigma) n n' / (n'W)^2
+    tensor = mean(sigma) M'M + mean(1 / sigma) n n' / (n'W)^2,  M = 1 - W n' / (n'W)
 
-where N_i are the hat functions and d_i the distances of the corners. W = mean(1 / sigma) n is a
-mixture of thin layers: the arithmetic mean along them, and the harmonic mean across. It is used for
-smooth profiles, for elements that several touches share, and for insulating touches, where it is
-better. tests/python/scene/test_cut_elements.py states the errors.
+where W is the gradient of the linear function that equals Phi(d) at the corners, dPhi/dd = 1 /
+sigma. W = mean(1 / sigma) n is a mixture of thin layers: the arithmetic mean along them, and the
+harmonic mean across. It is used for smooth profiles, for elements that several touches share, and
+for insulating touches, where it is better. tests/python/scene/test_cut_elements.py states the
+errors.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,7 +21,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from eitskin.arrays import BoolArray, FloatArray, IntArray
-from eitskin.fem.cem import hat_gradients
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.shaped_touch import centres_of_parts
 from eitskin.scene.random_touches import TrueTouch
@@ -144,7 +143,7 @@ def _tensors(
     away = (corners[cut] * normal[cut, None]).sum(axis=2)
     away -= _line(away, is_low[cut].mean(axis=1))[:, None]
     potential = away / np.where(away < 0, low[cut, None], high[cut, None])
-    bent = (hat_gradients(corners[cut]) * potential[:, :, None]).sum(axis=1)
+    bent = _gradient(corners[cut], potential)
     across = (bent * normal[cut]).sum(axis=1)
     # an obtuse element can leave this range; the formula then has no meaning
     good = (across >= 1 / high[cut]) & (across <= 1 / low[cut])
@@ -156,6 +155,15 @@ def _tensors(
     along = edge - (kink * edge).sum(axis=1)[:, None] * through
     of_along, of_through = (v[:, [0, 1, 0]] * v[:, [0, 1, 1]] for v in (along, through))
     return np.asarray(mean[:, None] * of_along + resistance[:, None] * of_through)
+
+
+def _gradient(corners: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the gradients (e, 2) of the linear functions with ``values`` (e, 3) at the corners (e,
+    3, 2) of triangles."""
+    (u_x, u_y), (v_x, v_y) = ((corners[:, k] - corners[:, 0]).T for k in (1, 2))
+    u, v = values[:, 1] - values[:, 0], values[:, 2] - values[:, 0]
+    both = np.column_stack([u * v_y - v * u_y, v * u_x - u * v_x])
+    return np.asarray(both / (u_x * v_y - u_y * v_x)[:, None])
 
 
 def _line(away: FloatArray, share: FloatArray) -> FloatArray:
