@@ -88,7 +88,7 @@ def stream(
         model=None if model is None else Path(model),
         model_for="an image" if "image" in mode else "",
         solver=_solver(solver),
-        target=None if preset is None else _preset(preset, solver),
+        preset=None if preset is None else _preset(preset, solver),
         tare=tare,
         record=None if record is None else Path(record),
         zones=() if zones is None else load_zones(zones),

@@ -108,7 +108,7 @@ TEST(test_silence)
 TEST(test_owner_keeps_it)
 {
     start_unheard();
-    TAKEN(set(EITS_SETTING_KEEP_DRIVE, 0));
+    TAKEN(set(EITS_SETTING_KEEP_CURRENT, 0));
     CHECK(drives());
     b.board.monitor.needs_host = false; /* the owner allows it */
     b.host.kept_on = true;
@@ -117,7 +117,7 @@ TEST(test_owner_keeps_it)
     CHECK(drives());
     bench_restart(&b);
     CHECK(drives());
-    CHECK_EQUAL(host_info(&b.host).settings, EITS_SETTING_KEEP_DRIVE);
+    CHECK_EQUAL(host_info(&b.host).settings, EITS_SETTING_KEEP_CURRENT);
     b.host.kept_on = false;
 }
 
@@ -220,7 +220,7 @@ TEST(test_limit)
     CHECK_EQUAL(host_info(&b.host).current_ua_rms, 401);
     CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_RAW, 1, 0).status, EITS_REPLY_TRIPPED);
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_TRIPPED);
-    TAKEN(set(EITS_SETTING_KEEP_DRIVE | EITS_SETTING_SENSE, 400));
+    TAKEN(set(EITS_SETTING_KEEP_CURRENT | EITS_SETTING_SENSE, 400));
     CHECK(!drives());
     TAKEN(set(EITS_SETTING_SENSE, EITS_LIMIT_KEPT));
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 400);

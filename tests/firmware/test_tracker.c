@@ -14,14 +14,14 @@ static void set_up(const skin_spec *spec)
     TARE(8);
 }
 
-static eits_packet_followed followed(uint32_t k)
+static eits_packet_drive_touches followed(uint32_t k)
 {
-    eits_packet_followed head = {0};
-    const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_FOLLOWED, k);
+    eits_packet_drive_touches head = {0};
+    const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_DRIVE_TOUCHES, k);
     CHECK(packet != NULL);
     if (packet != NULL) {
         memcpy(&head, packet->payload, sizeof head);
-        CHECK_EQUAL(packet->size, sizeof head + head.count * sizeof(eits_packet_followed_touch));
+        CHECK_EQUAL(packet->size, sizeof head + head.count * sizeof(eits_packet_drive_touch));
     }
     return head;
 }
@@ -41,12 +41,12 @@ static uint32_t with_flags(uint32_t flags)
 TEST(test_what_is_refused)
 {
     set_up(&SKIN_ADJACENT); /* without fields */
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_DRIVE_TOUCHES, 1, 0).status, EITS_REPLY_DRIVES);
     set_up(&SKIN_WITH_FIELDS);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 2, 0).status, EITS_REPLY_DRIVES);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_DRIVE_TOUCHES, 2, 0).status, EITS_REPLY_DRIVES);
     check_each(4);
     TARE(8);
-    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_FOLLOWED, 1, 0).status, EITS_REPLY_DRIVES);
+    CHECK_EQUAL(host_stream(&b.host, EITS_STREAM_DRIVE_TOUCHES, 1, 0).status, EITS_REPLY_DRIVES);
 }
 
 /* An untouched skin: one packet reports the beginning; all frames are aligned, unchanged to the
@@ -59,7 +59,7 @@ TEST(test_a_still_skin)
     host_run(&b.host, 20 * SCAN_MS);
     const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
     CHECK(frames >= 18);
-    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_FOLLOWED), 1);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_DRIVE_TOUCHES), 1);
     CHECK_EQUAL(followed(0).count, 0);
     CHECK_EQUAL(followed(0).begun, followed(0).frame);
     CHECK(with_flags(EITS_RAW_ALIGNED | EITS_RAW_TRUSTED) >= frames - 1); /* one was under way */
@@ -85,10 +85,10 @@ static void test_a_touch(uint64_t clock_cost_ns, uint64_t write_cost_ns)
     const uint32_t scanned = b.host.instrument.acquire.scan.frames_scanned;
     const uint64_t from_ns = b.board.now_ns;
     host_run(&b.host, 30 * SCAN_MS);
-    const uint32_t count = host_count(&b.host, EITS_PACKET_FOLLOWED);
+    const uint32_t count = host_count(&b.host, EITS_PACKET_DRIVE_TOUCHES);
     CHECK(count > DRIVES);
     for (uint32_t k = 1; k < count; ++k) {
-        const eits_packet_followed before = followed(k - 1), now = followed(k);
+        const eits_packet_drive_touches before = followed(k - 1), now = followed(k);
         CHECK_EQUAL(now.begun, begun);
         CHECK(now.count <= EITS_FAST_TOUCHES);
         if (before.count == 0)
@@ -165,7 +165,7 @@ TEST(test_beginning_again)
 TEST(test_a_place_that_frames_find)
 {
     set_up(&SKIN_WITH_FIELDS);
-    STREAM(EITS_STREAM_FOLLOWED, 1, 0);
+    STREAM(EITS_STREAM_DRIVE_TOUCHES, 1, 0);
     host_run(&b.host, 3 * SCAN_MS);
     fw_instrument *instrument = &b.host.instrument;
     fw_frame *frame = &instrument->solve.engine.frames[0];

@@ -76,10 +76,10 @@ static void check_solved(const eits_link_packet *packet)
 
 static void check_followed(const eits_link_packet *packet)
 {
-    eits_packet_followed head;
+    eits_packet_drive_touches head;
     MUST(packet->size >= sizeof head);
     memcpy(&head, packet->payload, sizeof head);
-    const size_t one = sizeof(eits_packet_followed_touch);
+    const size_t one = sizeof(eits_packet_drive_touch);
     MUST(head.count <= EITS_FAST_TOUCHES && packet->size == sizeof head + head.count * one);
     for (uint32_t k = 0; k < head.count; ++k)
         check_finite(packet->payload + sizeof head + k * one + 4, one / 4 - 1);
@@ -94,7 +94,7 @@ static const char *name_of(uint8_t type)
                  {EITS_PACKET_HASHES, "hashes"}, {EITS_PACKET_RAW, "raw"},
                  {EITS_PACKET_IMAGE, "image"},   {EITS_PACKET_TOUCHES, "touches"},
                  {EITS_PACKET_EVENTS, "events"}, {EITS_PACKET_REPLY, "replies"},
-                 {EITS_PACKET_FAULT, "faults"},  {EITS_PACKET_FOLLOWED, "followed"}};
+                 {EITS_PACKET_FAULT, "faults"},  {EITS_PACKET_DRIVE_TOUCHES, "followed"}};
     for (size_t k = 0; k < sizeof known / sizeof known[0]; ++k) {
         if (known[k].type == type)
             return known[k].name;
@@ -138,7 +138,7 @@ static void check_packet(const eits_link_packet *packet)
         }
     } else if (packet->type == EITS_PACKET_IMAGE || packet->type == EITS_PACKET_TOUCHES) {
         check_solved(packet);
-    } else if (packet->type == EITS_PACKET_FOLLOWED) {
+    } else if (packet->type == EITS_PACKET_DRIVE_TOUCHES) {
         check_followed(packet);
     } else if (packet->type == EITS_PACKET_EVENTS) {
         const size_t head = sizeof(eits_packet_events), one = sizeof(eits_packet_event);
@@ -209,7 +209,7 @@ static void check_board(void)
     MUST(s->excitation_millihz >= 3500000 && s->excitation_millihz <= 250000000);
     MUST(fw_whole_periods(s->excitation_millihz, s->sample_rate_hz, s->samples));
     MUST(fake.monitor.violation == NULL);
-    fake.monitor.needs_host = (m.instrument.safety.owner.settings & EITS_SETTING_KEEP_DRIVE) == 0;
+    fake.monitor.needs_host = (m.instrument.safety.owner.settings & EITS_SETTING_KEEP_CURRENT) == 0;
     MUST(fake.rewrites == 0 || worn);
     MUST(!m.instrument.link.upload.begun || !m.instrument.solve.engine.open ||
          m.instrument.link.upload.bank != m.instrument.solve.models.bank);
@@ -612,7 +612,7 @@ static void check_end(void)
         pass_ms(k < 12 ? 90 : 11000);
     MUST(m.instrument.solve.engine.open == open);
     MUST(!m.instrument.link.upload.active);
-    const bool kept = (m.instrument.safety.owner.settings & EITS_SETTING_KEEP_DRIVE) != 0;
+    const bool kept = (m.instrument.safety.owner.settings & EITS_SETTING_KEEP_CURRENT) != 0;
     MUST(kept || !m.instrument.acquire.scan.running);
     tell(EITS_PACKET_CLEAR_FAULTS); /* a limit of the current that tripped */
     tell(EITS_PACKET_STREAM);

@@ -36,7 +36,7 @@ typedef enum eits_packet_type {
     /* what a frame's touches amounted to */
     EITS_PACKET_EVENTS = 0x15,
     /* touches after a drive */
-    EITS_PACKET_FOLLOWED = 0x17,
+    EITS_PACKET_DRIVE_TOUCHES = 0x17,
     /* the board's counters */
     EITS_PACKET_STATS = 0x13,
     /* a fault that rose or went */
@@ -216,8 +216,8 @@ typedef enum eits_stream {
     EITS_STREAM_TOUCHES = 4,
     /* its events, as EVENTS, also where there are none; a tare forgets fingers */
     EITS_STREAM_EVENTS = 8,
-    /* touches after each drive, as FOLLOWED; of frames only trusted ones are solved */
-    EITS_STREAM_FOLLOWED = 16
+    /* touches after each drive, as DRIVE_TOUCHES; of frames only trusted ones are solved */
+    EITS_STREAM_DRIVE_TOUCHES = 16
 } eits_stream;
 
 /* The board, its model and its settings. */
@@ -411,7 +411,7 @@ typedef struct eits_packet_touch {
 
 /* Touches as of an instant within a scan. Where nothing touches it is sent once: when that begins,
  * or the touches have gone. */
-typedef struct eits_packet_followed {
+typedef struct eits_packet_drive_touches {
     /* number of the frame that is scanned */
     uint32_t frame;
     /* the instant they hold for: the middle of the drive, were no row repeated */
@@ -426,10 +426,10 @@ typedef struct eits_packet_followed {
     uint16_t drive;
     /* touches that follow */
     uint16_t count;
-} eits_packet_followed;
+} eits_packet_drive_touches;
 
 /* A touch, as eits_fast_touch. */
-typedef struct eits_packet_followed_touch {
+typedef struct eits_packet_drive_touch {
     /* from 1, apart from those of TOUCHES; stays with a touch */
     uint16_t id;
     /* 1: a whole frame has shown it */
@@ -443,7 +443,7 @@ typedef struct eits_packet_followed_touch {
     float vy_mm_per_s;
     /* S mm^2/m */
     float strength_s_per_m_mm2;
-} eits_packet_followed_touch;
+} eits_packet_drive_touch;
 
 /* Events of a frame; there are none if the core rejected it. */
 typedef struct eits_packet_events {
@@ -683,7 +683,7 @@ typedef enum eits_drive {
 /* Bits of the owner's settings. */
 typedef enum eits_setting {
     /* current flows on where no host listens */
-    EITS_SETTING_KEEP_DRIVE = 1,
+    EITS_SETTING_KEEP_CURRENT = 1,
     /* models, settings and lower excitations need the blue button */
     EITS_SETTING_LOCKED = 2,
     /* a sense resistor is fitted: the current is measured */

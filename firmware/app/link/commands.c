@@ -83,7 +83,7 @@ static fw_answer on_stream(fw_host_link *link, const void *payload, size_t size)
     (void)size;
     memcpy(&c, payload, sizeof c);
     const uint32_t all = EITS_STREAM_RAW | EITS_STREAM_IMAGE | EITS_STREAM_TOUCHES |
-                         EITS_STREAM_EVENTS | EITS_STREAM_FOLLOWED;
+                         EITS_STREAM_EVENTS | EITS_STREAM_DRIVE_TOUCHES;
     if (outside(&bad, offsetof(eits_command_stream, what), c.what, 0, all) ||
         outside(&bad, offsetof(eits_command_stream, every), c.every, 1, UINT16_MAX))
         return bad;
@@ -91,7 +91,7 @@ static fw_answer on_stream(fw_host_link *link, const void *payload, size_t size)
         return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
     if ((c.what & ~EITS_STREAM_RAW) != 0 && !fw_solve_tared(link->solve))
         return fw_refuse(EITS_REPLY_NOT_TARED, 0, 0);
-    if ((c.what & EITS_STREAM_FOLLOWED) != 0 && (c.every != 1 || !fw_tracker_possible(link->solve)))
+    if ((c.what & EITS_STREAM_DRIVE_TOUCHES) != 0 && (c.every != 1 || !fw_tracker_possible(link->solve)))
         return fw_refuse(EITS_REPLY_DRIVES, 0, 0);
     if (c.what != 0 && !fw_current_on(link->safety))
         return fw_refuse(EITS_REPLY_TRIPPED, 0, 0);
@@ -332,7 +332,7 @@ static fw_answer on_settings(fw_host_link *link, const void *payload, size_t siz
     fw_answer bad;
     (void)size;
     memcpy(&c, payload, sizeof c);
-    const uint32_t all = EITS_SETTING_KEEP_DRIVE | EITS_SETTING_LOCKED | EITS_SETTING_SENSE;
+    const uint32_t all = EITS_SETTING_KEEP_CURRENT | EITS_SETTING_LOCKED | EITS_SETTING_SENSE;
     if (c.current_limit_ua_rms == EITS_LIMIT_KEPT)
         c.current_limit_ua_rms = fw_owner_current_limit_ua(link->safety);
     if (outside(&bad, offsetof(eits_command_settings, settings), c.settings, 0, all) ||
@@ -346,7 +346,7 @@ static fw_answer on_settings(fw_host_link *link, const void *payload, size_t siz
         fw_current_off(link->safety, EITS_DRIVE_OFF);
     if (fw_owner_save(link->safety, c.settings, c.current_limit_ua_rms) != FW_OK)
         return fw_refuse(EITS_REPLY_FLASH, 0, 0);
-    if ((c.settings & EITS_SETTING_KEEP_DRIVE) != 0)
+    if ((c.settings & EITS_SETTING_KEEP_CURRENT) != 0)
         (void)fw_current_on(link->safety);
     return ok();
 }

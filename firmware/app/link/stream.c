@@ -109,7 +109,7 @@ static uint32_t solve(fw_host_link *link, const fw_frame *frame, const float *vo
 {
     fw_solved solved;
     const bool touches = (link->stream.what &
-                          (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS | EITS_STREAM_FOLLOWED)) != 0;
+                          (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS | EITS_STREAM_DRIVE_TOUCHES)) != 0;
     fw_frame_solve(link->solve, frame, volts, quality, touches, &solved);
     const uint32_t solve_us = solved.head.solve_us, touch_us = solved.head.touch_us;
     fw_stats_add(&link->stats, EITS_STAGE_SOLVE, solve_us);
@@ -151,7 +151,7 @@ static void stream(fw_host_link *link, fw_frame *frame, const fw_quality *qualit
 {
     const uint32_t what = link->stream.what;
     const bool solved = fw_solve_tared(link->solve) && (what & ~(uint32_t)EITS_STREAM_RAW) != 0;
-    const bool tracked = (what & EITS_STREAM_FOLLOWED) != 0;
+    const bool tracked = (what & EITS_STREAM_DRIVE_TOUCHES) != 0;
     const uint32_t began_us = fw_now_us(link->board);
     const float *volts = tracked ? fw_tracks_align(link, frame) : frame->volts;
     uint32_t solving_us = 0;

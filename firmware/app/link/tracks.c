@@ -8,7 +8,7 @@
 
 static bool wanted(const fw_host_link *link)
 {
-    return (link->stream.what & EITS_STREAM_FOLLOWED) != 0 && fw_tracker_ready(link->solve) &&
+    return (link->stream.what & EITS_STREAM_DRIVE_TOUCHES) != 0 && fw_tracker_ready(link->solve) &&
            !fw_current_settling(link->safety);
 }
 
@@ -20,10 +20,10 @@ static uint16_t short_us(uint32_t us)
 static void send(fw_host_link *link, const fw_scan_drive *drive, const fw_track_update *update,
                  uint32_t began_us)
 {
-    eits_packet_followed_touch body[EITS_FAST_TOUCHES];
+    eits_packet_drive_touch body[EITS_FAST_TOUCHES];
     for (uint32_t k = 0; k < update->count; ++k) {
         const eits_fast_touch *t = &update->touches[k];
-        body[k] = (eits_packet_followed_touch){.id = (uint16_t)t->id,
+        body[k] = (eits_packet_drive_touch){.id = (uint16_t)t->id,
                                                .confirmed = (uint16_t)t->confirmed,
                                                .x_mm = t->x_mm,
                                                .y_mm = t->y_mm,
@@ -32,14 +32,14 @@ static void send(fw_host_link *link, const fw_scan_drive *drive, const fw_track_
                                                .strength_s_per_m_mm2 = t->strength_s_per_m_mm2};
     }
     const uint32_t now_us = fw_now_us(link->board);
-    const eits_packet_followed head = {.frame = drive->frame,
+    const eits_packet_drive_touches head = {.frame = drive->frame,
                                        .time_us = drive->time_us,
                                        .begun = update->begun,
                                        .age_us = short_us(now_us - drive->end_us),
                                        .update_us = short_us(now_us - began_us),
                                        .drive = (uint16_t)update->drive,
                                        .count = (uint16_t)update->count};
-    (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_FOLLOWED, &head, sizeof head, body,
+    (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_DRIVE_TOUCHES, &head, sizeof head, body,
                            update->count * sizeof body[0]);
 }
 
@@ -104,7 +104,7 @@ void fw_tracks_release(fw_host_link *link)
 void fw_tracks_restart(fw_host_link *link)
 {
     const bool on =
-        (link->stream.what & EITS_STREAM_FOLLOWED) != 0 && fw_tracker_possible(link->solve);
+        (link->stream.what & EITS_STREAM_DRIVE_TOUCHES) != 0 && fw_tracker_possible(link->solve);
     fw_tracker_forget(link->solve);
     fw_acquire_report_drives(link->acquire, on ? go_on : NULL, link);
 }

@@ -10,7 +10,7 @@ uint32_t fw_owner_settings(const fw_safety *safety)
 
 bool fw_owner_keeps_current(const fw_safety *safety)
 {
-    return (safety->owner.settings & EITS_SETTING_KEEP_DRIVE) != 0;
+    return (safety->owner.settings & EITS_SETTING_KEEP_CURRENT) != 0;
 }
 
 uint32_t fw_owner_current_limit_ua(const fw_safety *safety)

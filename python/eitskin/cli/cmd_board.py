@@ -15,9 +15,9 @@ SETTINGS = (  # bits of eits_setting, each with the option that sets it and the 
         ("--unlock", "nothing needs the button"),
     ),
     (
-        "KEEP_DRIVE",
-        ("--keep-drive", "the current keeps flowing when no program listens"),
-        ("--no-keep-drive", "the current then stops within a second (as delivered)"),
+        "KEEP_CURRENT",
+        ("--keep-current", "the current keeps flowing when no program listens"),
+        ("--no-keep-current", "the current then stops within a second (as delivered)"),
     ),
     (
         "SENSE",

@@ -292,7 +292,7 @@ def session_settings(
         model_for=model_for,
         scan=read_scan(options),
         solver=read_solver(options),
-        target=read_preset(options, "f767"),
+        preset=read_preset(options, "f767"),
         tare=None if options.tare is None else check_tare_frames(options.tare),
         zones=read_zones(getattr(options, "zones", None)),
         record=record,

@@ -12,7 +12,7 @@ PACKET_BYTES = 16  # head, checksum, zeros and stuffing
 RAW_BYTES, ROW_BYTES = 16, 5
 SOLVED_BYTES, PIXEL_BYTES, TOUCHES_BYTES = 104, 4, 8 * 44
 EVENTS_BYTES = 12 + 4 * 28
-FOLLOWED_BYTES = 20 + 24  # of one touch, after each drive
+DRIVE_TOUCHES_BYTES = 20 + 24  # of one touch, after each drive
 
 
 def frame_bytes(info: BoardInfo, what: Stream) -> int:
@@ -22,7 +22,7 @@ def frame_bytes(info: BoardInfo, what: Stream) -> int:
         Stream.IMAGE: SOLVED_BYTES + PIXEL_BYTES * info.n_pixels,
         Stream.TOUCHES: SOLVED_BYTES + TOUCHES_BYTES,
         Stream.EVENTS: EVENTS_BYTES,
-        Stream.FOLLOWED: info.n_electrodes * (FOLLOWED_BYTES + PACKET_BYTES) - PACKET_BYTES,
+        Stream.DRIVE_TOUCHES: info.n_electrodes * (DRIVE_TOUCHES_BYTES + PACKET_BYTES) - PACKET_BYTES,
     }
     return sum(size + PACKET_BYTES + size // 254 for kind, size in kinds.items() if kind & what)
 

@@ -21,7 +21,7 @@ from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
     Fault,
-    FollowedTouches,
+    DriveTouches,
     FrameEvents,
     RawFrame,
     Reply,
@@ -34,7 +34,7 @@ from eitskin.errors import DeviceError, EitskinError
 
 Answer = Reply | BoardInfo | BoardStats | BoardHashes
 FramePart = RawFrame | SolvedImage | SolvedTouches | FrameEvents
-Streamed = FramePart | FollowedTouches | Fault | LinkEvent
+Streamed = FramePart | DriveTouches | Fault | LinkEvent
 ROOM = 1024
 ANSWERS = 64  # that nobody waits for; older ones are forgotten
 USELESS = 10_000  # packets in a row that are neither streamed nor answers
@@ -153,7 +153,7 @@ class Link(ABC):
         that nobody fetched."""
         if len(self._queue) < self._room:
             return
-        droppable = FramePart | FollowedTouches
+        droppable = FramePart | DriveTouches
         place = next((k for k, one in enumerate(self._queue) if isinstance(one, droppable)), 0)
         del self._queue[place]
         self.counters.dropped += 1

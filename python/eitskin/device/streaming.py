@@ -10,7 +10,7 @@ from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.explain import reply_text
 from eitskin.device.wire.link_table import Drive, Stream, StreamCommand
 from eitskin.device.wire.packets import (
-    FollowedTouches,
+    DriveTouches,
     FrameEvents,
     RawFrame,
     SolvedImage,
@@ -57,14 +57,14 @@ class _Progress:
     def __init__(self, what: Stream, frames: int) -> None:
         self.what, self.wanted = what, frames
         self.restarts = 0  # of the board, when it last began to stream
-        self._came = {kind: 0 for kind in Stream if kind & what & ~Stream.FOLLOWED}
+        self._came = {kind: 0 for kind in Stream if kind & what & ~Stream.DRIVE_TOUCHES}
 
     def take(self, item: Streamed) -> bool:
         """Count ``item``; False where it is a frame's of a kind that was not asked for."""
         kind = _KIND.get(type(item))
         if kind is None:
             return True
-        if kind is Stream.FOLLOWED:  # of drives, not of frames
+        if kind is Stream.DRIVE_TOUCHES:  # of drives, not of frames
             return bool(kind & self.what)
         if kind not in self._came:
             return False
@@ -87,7 +87,7 @@ _KIND: dict[type, Stream] = {
     SolvedImage: Stream.IMAGE,
     SolvedTouches: Stream.TOUCHES,
     FrameEvents: Stream.EVENTS,
-    FollowedTouches: Stream.FOLLOWED,
+    DriveTouches: Stream.DRIVE_TOUCHES,
 }
 
 
@@ -226,8 +226,8 @@ class RecordedPackets:
         if item is None:
             self.over = True
             return None
-        if isinstance(item, FollowedTouches):
-            return item if self._what & Stream.FOLLOWED else None
+        if isinstance(item, DriveTouches):
+            return item if self._what & Stream.DRIVE_TOUCHES else None
         if not isinstance(item, FramePart):
             return item
         place = self._places.setdefault(item.frame, len(self._places))

@@ -90,10 +90,10 @@ class PageCommands:
 
     def preset(self, name: str) -> Future[str]:
         """Scan and solver by name, and the reference for them."""
-        session, target = self._board("a preset"), named_preset(name, "f767")
+        session, preset = self._board("a preset"), named_preset(name, "f767")
 
         def action(device: Device) -> str:
-            session.apply(replace(session.settings, target=target))
+            session.apply(replace(session.settings, preset=preset))
             take_reference(device, TARE_FRAMES, streamed=True)
             return f"preset {name} is in use, and the reference is taken"
 

@@ -72,7 +72,7 @@ def setup_text(session: Session, may_command: bool) -> str:
         "reference_v": None if mean_v is None else mean_v.tolist(),
         "sign": None if solver is None else solver.sign,
         "iterations": None if solver is None else solver.iterations,
-        "preset": "" if how.target is None else how.target.name,
+        "preset": "" if how.preset is None else how.preset.name,
         "recording": None if session.recorder is None else session.recorder.path.name,
         "model_crc": f"{board.model_crc:08x}",
         "zones": [asdict(zone) for zone in how.zones],

@@ -9,7 +9,7 @@ from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import (
     Fault,
-    FollowedTouches,
+    DriveTouches,
     FrameEvents,
     RawFrame,
     SolvedImage,
@@ -27,7 +27,7 @@ class Assembler:
     its last kind came, or another frame begins."""
 
     def __init__(self, wanted: Stream, clock: "Clock | None" = None) -> None:
-        self._wanted = bin(wanted & ~Stream.FOLLOWED).count("1")
+        self._wanted = bin(wanted & ~Stream.DRIVE_TOUCHES).count("1")
         self._clock = clock or Clock()
         self._parts: dict[type, FramePart] = {}
         self._number: int | None = None
@@ -36,7 +36,7 @@ class Assembler:
         """The messages that ``item`` completes."""
         if isinstance(item, Fault | LinkEvent):
             return [notice_of(item)]
-        if isinstance(item, FollowedTouches):
+        if isinstance(item, DriveTouches):
             board_us = item.head.time_us
             return [DriveReport(self._clock.elapsed_us(board_us), board_us, item)]
         done: list[Message] = []

@@ -18,8 +18,8 @@ from eitskin.core.notebook import places_text, touches_html
 from eitskin.device.known_model import KnownModel
 from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.explain import status_text
-from eitskin.device.wire.link_table import FollowedTouch
-from eitskin.device.wire.packets import Fault, FollowedTouches, RawFrame, Solved
+from eitskin.device.wire.link_table import DriveTouch
+from eitskin.device.wire.packets import Fault, DriveTouches, RawFrame, Solved
 from eitskin.errors import MissingExtraError
 from eitskin.session.message import TrueTouch, frame_table, head, report_table, true_table
 from eitskin.solve.image_touches import touches_in_image
@@ -57,7 +57,7 @@ class DriveReport:
 
     time_us: int
     board_us: int
-    packet: FollowedTouches
+    packet: DriveTouches
     time_unix_s: float | None = None
 
     @property
@@ -76,7 +76,7 @@ class DriveReport:
         return self.packet.head.drive
 
     @property
-    def touches(self) -> tuple[FollowedTouch, ...]:
+    def touches(self) -> tuple[DriveTouch, ...]:
         """In the order in which they came: mm, mm/s; their ids are not those of frames."""
         return self.packet.touches
 

@@ -13,7 +13,7 @@ from importlib.resources import files
 from typing import Any, Protocol
 
 from eitskin.core.diagnostics_table import Touch
-from eitskin.device.wire.link_table import FollowedTouch
+from eitskin.device.wire.link_table import DriveTouch
 
 VERSION = 1
 
@@ -84,7 +84,7 @@ def report_table(
     drive: int,
     time_s: float,
     time_unix_s: float | None,
-    touches: Sequence[FollowedTouch],
+    touches: Sequence[DriveTouch],
 ) -> dict[str, Any]:
     """What the message of touches after a drive has."""
     return head("report") | {

@@ -41,8 +41,8 @@ from eitskin.session.summary import Summary
 from eitskin.session.zones import refuse_off_skin
 
 KEPT_ON = (
-    "the board's owner has set keep-drive: current flows on when this program ends;  eitskin board"
-    " --no-keep-drive  changes that"
+    "the board's owner has set keep-current: current flows on when this program ends;  eitskin board"
+    " --no-keep-current  changes that"
 )
 TICK_S = 0.25  # of a real board: how soon a request, a stop or a lost port is noticed
 ALL_KINDS = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
@@ -196,7 +196,7 @@ class Session:
     def change_solver(self, solver: SolverSettings) -> None:
         """Solve with other settings from the next frame on."""
         self.solver = set_up(self.device, ScanSettings(), solver, self.known)
-        self.settings = replace(self.settings, solver=solver, target=None)
+        self.settings = replace(self.settings, solver=solver, preset=None)
         if self.observer is not None and solver.sign is not None:
             self.observer.look_for(solver.sign)
 
@@ -259,7 +259,7 @@ class Session:
         """Ask for the packets from now on, and for what puts them together."""
         how, what = self.settings, self.mode
         if how.report == "drive":
-            what |= Stream.FOLLOWED
+            what |= Stream.DRIVE_TOUCHES
         if self.replays:
             if what & Stream.EVENTS:
                 what |= Stream.TOUCHES  # of which gestures are made where none were recorded
@@ -384,7 +384,7 @@ class Session:
         how = self.settings
         if self.replays:
             return
-        if self.device.board.settings & Setting.KEEP_DRIVE:
+        if self.device.board.settings & Setting.KEEP_CURRENT:
             self._say(KEPT_ON)
         self._watch_start()
         self.solver = set_up(self.device, *self.scan_and_solver(), self.known)
@@ -428,7 +428,7 @@ class Session:
             self._say("touch it")
 
     def scan_and_solver(self) -> tuple[ScanSettings, SolverSettings]:
-        """As named; with a target those of the measured point that it chooses."""
+        """As named; with a preset those of the measured point that it chooses."""
         return self.settings.scan_and_solver(self.device.board, self.known, self.name, self._say)
 
     def _carried(self) -> int:

@@ -44,7 +44,7 @@ class SessionSettings:
         model_for: what cannot do without the board's model, such as "a picture"; "": nothing.
         tare: take the reference from so many frames; None: from 16 where that is needed.
         zones: named places that fingers press (``eitskin.session.zones``).
-        target: a preset that chooses the solver's settings.
+        preset: a preset that chooses the solver's settings.
         record: a new recording of every packet; an existing file is written over.
         quiet_frames: the untouched frames of the reference are sent too, and their mean is kept.
     """
@@ -59,7 +59,7 @@ class SessionSettings:
     scan: ScanSettings = field(default_factory=ScanSettings)
     solver: SolverSettings = field(default_factory=SolverSettings)
     zones: tuple[Zone, ...] = ()
-    target: "Preset | None" = None
+    preset: "Preset | None" = None
     tare: int | None = None
     record: Path | None = None
     quiet_frames: bool = False
@@ -67,17 +67,17 @@ class SessionSettings:
     def scan_and_solver(
         self, board: BoardInfo, known: KnownModel | None, name: str, say: Say
     ) -> tuple[ScanSettings, SolverSettings]:
-        """As named; with a target those of the measured point that it chooses for the board's
+        """As named; with a preset those of the measured point that it chooses for the board's
         ``known`` model; ``name`` is the board's."""
-        scan, named, target = self.scan, self.solver, self.target
-        if target is None:
+        scan, named, preset = self.scan, self.solver, self.preset
+        if preset is None:
             return scan, named
 
         known = known or need_model(board, self.model, name, "a preset")
-        any_scan = target.unit == REPORT_US
+        any_scan = preset.unit == REPORT_US
         now = named.applied(known.model, board)
-        point = operating_point_for(target, known.model, now, board_takes(), any_scan)
-        say(settings_text(point, target.board))
+        point = operating_point_for(preset, known.model, now, board_takes(), any_scan)
+        say(settings_text(point, preset.board))
         one = point.configuration
         kept = {k: value for k, value in one.solver_settings.items() if k in board_takes()}
         own = {key: getattr(named, key) for key in ("sign", "warm_start", "diagnostics", "track")}
@@ -89,7 +89,7 @@ class SessionSettings:
     def refuse_of_recording(self, name: str) -> None:
         """A recording takes no settings."""
         named: dict[str, Any] = {**self.scan.named, **self.solver.named}
-        if self.target is not None:
+        if self.preset is not None:
             named["preset"] = True
         if named or self.tare is not None:
             what = next(iter(named), "tare").replace("_", "-")

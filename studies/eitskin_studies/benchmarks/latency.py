@@ -243,7 +243,7 @@ def follow(
     with Session(f"{board}:{scene}", settings, observe=observe_scene) as session:
         session.start()
         sizes = [0]  # of the last packet with touches
-        teller = PacketType.TOUCHES if report == "frame" else PacketType.FOLLOWED
+        teller = PacketType.TOUCHES if report == "frame" else PacketType.DRIVE_TOUCHES
 
         def tap(packet: Packet) -> None:
             if packet.type == teller:

@@ -11,7 +11,7 @@ from jsonschema import Draft202012Validator
 
 from eitskin.device.settings import ScanSettings
 from eitskin.device.wire.codec import Decoder, encode
-from eitskin.device.wire.link_table import FollowedHead, FollowedTouch, PacketType, Stream
+from eitskin.device.wire.link_table import DriveTouchesHead, DriveTouch, PacketType, Stream
 from eitskin.device.wire.payloads import MalformedPacket, pack, parse
 from eitskin.errors import DeviceError
 from eitskin.session.checks.host_check import check_recording
@@ -110,10 +110,10 @@ def test_a_recording_gives_them_again_to_the_bit(recorded):
 
 def test_another_bit_is_noticed(recorded, tmp_path):
     packets = Decoder().feed(recorded[0].read_bytes())
-    (first, *_) = [one for one in packets if one.type == PacketType.FOLLOWED and
-                   len(one.payload) > FollowedHead.LAYOUT.size]  # fmt: skip
+    (first, *_) = [one for one in packets if one.type == PacketType.DRIVE_TOUCHES and
+                   len(one.payload) > DriveTouchesHead.LAYOUT.size]  # fmt: skip
     changed = bytearray(first.payload)
-    changed[FollowedHead.LAYOUT.size + 4] ^= 1  # of x
+    changed[DriveTouchesHead.LAYOUT.size + 4] ^= 1  # of x
     path = tmp_path / "changed.eits"
     path.write_bytes(b"".join(
         encode(one.type, one.sequence, bytes(changed) if one is first else one.payload)
@@ -130,8 +130,8 @@ def test_half_scans_are_refused(scene, scan):
         followed(f"sim:{scene}", replace(SETTINGS, scan=scan))
 
 
-HEAD = FollowedHead(3, 100, 2, 50, 40, 5, 1)
-TOUCH = FollowedTouch(1, True, 1.0, 2.0, 3.0, 4.0, 5.0)
+HEAD = DriveTouchesHead(3, 100, 2, 50, 40, 5, 1)
+TOUCH = DriveTouch(1, True, 1.0, 2.0, 3.0, 4.0, 5.0)
 GOOD = pack(HEAD) + pack(TOUCH)
 
 
@@ -147,5 +147,5 @@ GOOD = pack(HEAD) + pack(TOUCH)
     ],
 )
 def test_a_malformed_packet_of_a_drive_is_refused(payload):
-    with pytest.raises(MalformedPacket, match="FOLLOWED"):
-        parse(PacketType.FOLLOWED, payload)
+    with pytest.raises(MalformedPacket, match="DRIVE_TOUCHES"):
+        parse(PacketType.DRIVE_TOUCHES, payload)

@@ -61,7 +61,7 @@ def test_whoever_follows_a_board_hears_that_current_flows_on(
 ):
     def opened(*url: object, **how: object) -> Device:
         device = open_device("sim:two_touch")
-        device.settings(Setting.KEEP_DRIVE)
+        device.settings(Setting.KEEP_CURRENT)
         return device
 
     for opening, reported in ((open_with_files, []), (opened, [KEPT_ON])):

@@ -15,7 +15,7 @@ from unicorn.unicorn_const import UC_HOOK_CODE
 
 from eitskin.device.wire.codec import Decoder
 from eitskin.device.wire.link_table import Stream
-from eitskin.device.wire.packets import FollowedTouches, RawFrame, SolvedTouches
+from eitskin.device.wire.packets import DriveTouches, RawFrame, SolvedTouches
 from eitskin.device.wire.payloads import parse
 from eitskin.session.session import Session
 from eitskin.session.settings import SessionSettings
@@ -48,14 +48,14 @@ class Recorded:
 
     untouched: list[RawFrame]
     raw: list[RawFrame]
-    drives: list[FollowedTouches]
+    drives: list[DriveTouches]
     touches: list[SolvedTouches]
 
     @classmethod
     def read(cls, run: Path) -> Recorded:
         sent = [parse(one.type, one.payload) for one in Decoder().feed(run.read_bytes())]
         raw = [one for one in sent if isinstance(one, RawFrame)]
-        drives = [one for one in sent if isinstance(one, FollowedTouches)]
+        drives = [one for one in sent if isinstance(one, DriveTouches)]
         first = drives[0].head.begun
         return cls(
             [one for one in raw if one.untouched],

@@ -21,7 +21,7 @@ from jsonschema import Draft202012Validator
 from swipe_frames import Swipe
 
 import eitskin
-from eitskin.device.wire.link_table import FollowedTouch
+from eitskin.device.wire.link_table import DriveTouch
 from eitskin.session.frame import Frame
 from eitskin.session.message import schema
 from eitskin.sinks.outputs import Outputs
@@ -391,7 +391,7 @@ def test_mcap(swipe, drives, tmp_path):
         (one.frame, one.drive, one.time_s) for one in drives.reports
     ]
     for message, report in zip(came["/reports"], drives.reports, strict=True):
-        names = [field.name for field in fields(FollowedTouch)]
+        names = [field.name for field in fields(DriveTouch)]
         seen = [tuple(getattr(touch, name) for name in names) for touch in message.touches]
         assert seen == [astuple(touch) for touch in report.touches]
 

@@ -43,7 +43,7 @@ class PacketType(IntEnum):
     IMAGE = 0x11  # a frame's image
     TOUCHES = 0x12  # a frame's touches
     EVENTS = 0x15  # what a frame's touches amounted to
-    FOLLOWED = 0x17  # touches after a drive
+    DRIVE_TOUCHES = 0x17  # touches after a drive
     STATS = 0x13  # the board's counters
     FAULT = 0x14  # a fault that rose or went
     HASHES = 0x16  # SHA-256 of the model and of the firmware
@@ -145,7 +145,7 @@ class Drive(IntEnum):
 class Setting(IntFlag):
     """eits_setting: Bits of the owner's settings."""
 
-    KEEP_DRIVE = 1  # current flows on where no host listens
+    KEEP_CURRENT = 1  # current flows on where no host listens
     LOCKED = 2  # models, settings and lower excitations need the blue button
     SENSE = 4  # a sense resistor is fitted: the current is measured
 
@@ -167,7 +167,8 @@ class Stream(IntFlag):
     IMAGE = 2  # its image, as an IMAGE
     TOUCHES = 4  # its touches, as TOUCHES
     EVENTS = 8  # its events, as EVENTS, also where there are none; a tare forgets fingers
-    FOLLOWED = 16  # touches after each drive, as FOLLOWED; of frames only trusted ones are solved
+    # touches after each drive, as DRIVE_TOUCHES; of frames only trusted ones are solved
+    DRIVE_TOUCHES = 16
 
 
 @dataclass(frozen=True)
@@ -290,7 +291,7 @@ class TouchPacket(Payload, c="eits_packet_touch"):
 
 
 @dataclass(frozen=True)
-class FollowedHead(Payload, c="eits_packet_followed"):
+class DriveTouchesHead(Payload, c="eits_packet_drive_touches"):
     """Touches as of an instant within a scan. Where nothing touches it is sent once: when that
     begins, or the touches have gone.
     """
@@ -305,7 +306,7 @@ class FollowedHead(Payload, c="eits_packet_followed"):
 
 
 @dataclass(frozen=True)
-class FollowedTouch(Payload, c="eits_packet_followed_touch"):
+class DriveTouch(Payload, c="eits_packet_drive_touch"):
     """A touch, as eits_fast_touch."""
 
     id: U16  # from 1, apart from those of TOUCHES; stays with a touch

@@ -16,8 +16,8 @@ from eitskin.device.wire.link_table import (
     Drive,
     FaultCode,
     FaultPacket,
-    FollowedHead,
-    FollowedTouch,
+    DriveTouchesHead,
+    DriveTouch,
     HashesPacket,
     InfoPacket,
     RawFlags,
@@ -84,7 +84,7 @@ class BoardInfo(InfoPacket):
 
     @property
     def setting_names(self) -> list[str]:
-        """The owner's settings that are on: "keep-drive"."""
+        """The owner's settings that are on: "keep-current"."""
         return [str(one.name).lower().replace("_", "-") for one in Setting if one & self.settings]
 
     @property
@@ -180,11 +180,11 @@ class SolvedTouches:
 
 
 @dataclass(frozen=True)
-class FollowedTouches:
+class DriveTouches:
     """Touches after a drive, in the order in which they came."""
 
-    head: FollowedHead
-    touches: tuple[FollowedTouch, ...]
+    head: DriveTouchesHead
+    touches: tuple[DriveTouch, ...]
 
     @property
     def frame(self) -> int:
@@ -220,7 +220,7 @@ FromBoard = (
     | RawFrame
     | SolvedImage
     | SolvedTouches
-    | FollowedTouches
+    | DriveTouches
     | FrameEvents
     | BoardStats
     | Fault

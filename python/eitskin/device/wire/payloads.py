@@ -16,8 +16,8 @@ from eitskin.device.wire.link_table import (
     STAGES,
     EventPacket,
     EventsHead,
-    FollowedHead,
-    FollowedTouch,
+    DriveTouchesHead,
+    DriveTouch,
     PacketType,
     RawHead,
     StageStats,
@@ -28,7 +28,7 @@ from eitskin.device.wire.packets import (
     BoardInfo,
     BoardStats,
     Fault,
-    FollowedTouches,
+    DriveTouches,
     FrameEvents,
     FromBoard,
     RawFrame,
@@ -138,15 +138,15 @@ def parse_touches(payload: bytes) -> SolvedTouches:
     return SolvedTouches(solved, tuple(map(known_touch, found)))
 
 
-def parse_followed(payload: bytes) -> FollowedTouches:
-    head, each = unpack(FollowedHead, payload, "FOLLOWED", more=True), FollowedTouch.LAYOUT
-    _check_rest(payload, head, each.size * head.count, "FOLLOWED")
+def parse_drive_touches(payload: bytes) -> DriveTouches:
+    head, each = unpack(DriveTouchesHead, payload, "DRIVE_TOUCHES", more=True), DriveTouch.LAYOUT
+    _check_rest(payload, head, each.size * head.count, "DRIVE_TOUCHES")
     rest = payload[head.LAYOUT.size :]
     parts = (rest[k : k + each.size] for k in range(0, len(rest), each.size))
-    found = tuple(unpack(FollowedTouch, part, "FOLLOWED") for part in parts)
+    found = tuple(unpack(DriveTouch, part, "DRIVE_TOUCHES") for part in parts)
     if not np.isfinite([astuple(touch)[2:] for touch in found]).all():
-        raise MalformedPacket("FOLLOWED: a touch whose place, velocity or strength is no number")
-    return FollowedTouches(head, found)
+        raise MalformedPacket("DRIVE_TOUCHES: a touch whose place, velocity or strength is no number")
+    return DriveTouches(head, found)
 
 
 def parse_events(payload: bytes) -> FrameEvents:
@@ -173,7 +173,7 @@ _PARSERS: dict[int, Callable[[bytes], FromBoard]] = {
     PacketType.IMAGE: parse_image,
     PacketType.TOUCHES: parse_touches,
     PacketType.EVENTS: parse_events,
-    PacketType.FOLLOWED: parse_followed,
+    PacketType.DRIVE_TOUCHES: parse_drive_touches,
     PacketType.STATS: lambda payload: unpack(BoardStats, payload, "STATS"),
     PacketType.HASHES: lambda payload: unpack(BoardHashes, payload, "HASHES"),
     PacketType.FAULT: lambda payload: unpack(Fault, payload, "FAULT"),

@@ -13,8 +13,8 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
 from eitskin.core.fast import FastCore, FastTouch
 from eitskin.core.results import Reconstruction
-from eitskin.device.wire.link_table import FollowedTouch, RawFlags
-from eitskin.device.wire.packets import BoardInfo, FollowedTouches, RawFrame
+from eitskin.device.wire.link_table import DriveTouch, RawFlags
+from eitskin.device.wire.packets import BoardInfo, DriveTouches, RawFrame
 from eitskin.errors import FrameError
 from eitskin.skin.protocol import Protocol
 
@@ -34,7 +34,7 @@ class DrivesTwin:
         self._found: Sequence[Touch] | None = None
         self.same = self.different = 0
 
-    def hear(self, packet: FollowedTouches) -> None:
+    def hear(self, packet: DriveTouches) -> None:
         """Of a drive; its frame comes later."""
         head = packet.head
         self._reported[head.frame][head.drive] = _numbers(packet.touches)
@@ -95,7 +95,7 @@ def _in_order(fast: FastCore, protocol: Protocol) -> list[int]:
     return [first[int(row)] for row in protocol.scan_rows if int(row) in first]
 
 
-def _numbers(touches: Sequence[FollowedTouch] | Sequence[FastTouch]) -> Numbers:
+def _numbers(touches: Sequence[DriveTouch] | Sequence[FastTouch]) -> Numbers:
     """Each touch's numbers as they are on the wire."""
     return tuple(
         np.array([touch.id & 0xFFFF, touch.confirmed, touch.x_mm, touch.y_mm, touch.vx_mm_per_s,

@@ -18,7 +18,7 @@ from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.recordings.recording import FileTransport, recorded_kinds, recorded_options
 from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.link_table import Quality
-from eitskin.device.wire.packets import BoardInfo, FollowedTouches, RawFrame, Solved
+from eitskin.device.wire.packets import BoardInfo, DriveTouches, RawFrame, Solved
 from eitskin.errors import FrameError
 from eitskin.session.assemble import read_frames
 from eitskin.session.checks.drives_twin import DrivesTwin
@@ -110,7 +110,7 @@ class HostTwin:
         if self._drives is not None:
             self._drives.forget()
 
-    def hear(self, packet: FollowedTouches) -> None:
+    def hear(self, packet: DriveTouches) -> None:
         """Touches after a drive; their frame comes later."""
         engine = self._core.c_engine
         if self._drives is None and self._board is not None and engine is not None:

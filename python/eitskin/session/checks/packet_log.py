@@ -10,7 +10,7 @@ from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import (
     Fault,
-    FollowedTouches,
+    DriveTouches,
     FrameEvents,
     RawFrame,
     SolvedImage,
@@ -20,7 +20,7 @@ from eitskin.device.wire.payloads import MalformedPacket, parse
 from eitskin.session.assemble import assembled
 from eitskin.session.frame import Message
 
-_Content = RawFrame | SolvedImage | SolvedTouches | FollowedTouches | FrameEvents | Fault
+_Content = RawFrame | SolvedImage | SolvedTouches | DriveTouches | FrameEvents | Fault
 
 
 class PacketLog:
