@@ -1,4 +1,5 @@
 /* Numbers inside a model: out of range, not finite. */
+#include "model/sections.h"
 #include "steps.h"
 
 static const small_spec TINY = {.rank = 3, .side = 3};
@@ -57,6 +58,21 @@ TEST(orders_have_each_drive_once_and_whole)
     CHECK_EQUAL(with_order(6, 7, 80, 0, 160), EITS_E_MODEL_VALUE);   /* rows of a drive turned */
     CHECK_EQUAL(with_order(0, 1, 80, 0, 160), EITS_E_MODEL_VALUE);   /* the first no drive's */
     CHECK_EQUAL(with_order(4, 9, 80, 0, 160), EITS_E_MODEL_VALUE);   /* drives mixed */
+}
+
+TEST(an_order_is_read_only_within_its_section)
+{
+    /* Two rows, each a drive. The bytes after each table are such that row 2, which does not exist,
+     * could be the second in the order. */
+    enum { ROWS = 2 };
+    static const uint8_t protocol[4 * (ROWS + 1)] = {0, 1, 2, 3, 1, 2, 3, 0, 2, 3, 0, 1};
+    static const uint16_t orders[2][2 * ROWS + 1] = {{0, 1, 0, 1, 1}, {0, 2, 0, 1, 1}};
+    static const eits_status expected[2] = {EITS_OK, EITS_E_MODEL_VALUE};
+    for (uint32_t k = 0; k < 2; ++k) {
+        eits_model model = {.n_rows = ROWS, .protocol = protocol};
+        const eits_section found = {(const uint8_t *)orders[k], 4 * ROWS};
+        CHECK_EQUAL(eits_read_scan_order(&model, &found), expected[k]);
+    }
 }
 
 static eits_status with_place_factor(float factor, uint32_t size)

@@ -91,7 +91,8 @@ static fw_answer on_stream(fw_host_link *link, const void *payload, size_t size)
         return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
     if ((c.what & ~EITS_STREAM_RAW) != 0 && !fw_solve_tared(link->solve))
         return fw_refuse(EITS_REPLY_NOT_TARED, 0, 0);
-    if ((c.what & EITS_STREAM_DRIVE_TOUCHES) != 0 && (c.every != 1 || !fw_tracker_possible(link->solve)))
+    if ((c.what & EITS_STREAM_DRIVE_TOUCHES) != 0 &&
+        (c.every != 1 || !fw_tracker_possible(link->solve)))
         return fw_refuse(EITS_REPLY_DRIVES, 0, 0);
     if (c.what != 0 && !fw_current_on(link->safety))
         return fw_refuse(EITS_REPLY_TRIPPED, 0, 0);

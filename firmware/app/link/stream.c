@@ -108,8 +108,8 @@ static uint32_t solve(fw_host_link *link, const fw_frame *frame, const float *vo
                       const fw_quality *quality)
 {
     fw_solved solved;
-    const bool touches = (link->stream.what &
-                          (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS | EITS_STREAM_DRIVE_TOUCHES)) != 0;
+    const bool touches = (link->stream.what & (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS |
+                                               EITS_STREAM_DRIVE_TOUCHES)) != 0;
     fw_frame_solve(link->solve, frame, volts, quality, touches, &solved);
     const uint32_t solve_us = solved.head.solve_us, touch_us = solved.head.touch_us;
     fw_stats_add(&link->stats, EITS_STAGE_SOLVE, solve_us);

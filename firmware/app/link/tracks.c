@@ -24,21 +24,21 @@ static void send(fw_host_link *link, const fw_scan_drive *drive, const fw_track_
     for (uint32_t k = 0; k < update->count; ++k) {
         const eits_fast_touch *t = &update->touches[k];
         body[k] = (eits_packet_drive_touch){.id = (uint16_t)t->id,
-                                               .confirmed = (uint16_t)t->confirmed,
-                                               .x_mm = t->x_mm,
-                                               .y_mm = t->y_mm,
-                                               .vx_mm_per_s = t->vx_mm_per_s,
-                                               .vy_mm_per_s = t->vy_mm_per_s,
-                                               .strength_s_per_m_mm2 = t->strength_s_per_m_mm2};
+                                            .confirmed = (uint16_t)t->confirmed,
+                                            .x_mm = t->x_mm,
+                                            .y_mm = t->y_mm,
+                                            .vx_mm_per_s = t->vx_mm_per_s,
+                                            .vy_mm_per_s = t->vy_mm_per_s,
+                                            .strength_s_per_m_mm2 = t->strength_s_per_m_mm2};
     }
     const uint32_t now_us = fw_now_us(link->board);
     const eits_packet_drive_touches head = {.frame = drive->frame,
-                                       .time_us = drive->time_us,
-                                       .begun = update->begun,
-                                       .age_us = short_us(now_us - drive->end_us),
-                                       .update_us = short_us(now_us - began_us),
-                                       .drive = (uint16_t)update->drive,
-                                       .count = (uint16_t)update->count};
+                                            .time_us = drive->time_us,
+                                            .begun = update->begun,
+                                            .age_us = short_us(now_us - drive->end_us),
+                                            .update_us = short_us(now_us - began_us),
+                                            .drive = (uint16_t)update->drive,
+                                            .count = (uint16_t)update->count};
     (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_DRIVE_TOUCHES, &head, sizeof head, body,
                            update->count * sizeof body[0]);
 }

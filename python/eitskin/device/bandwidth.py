@@ -22,7 +22,8 @@ def frame_bytes(info: BoardInfo, what: Stream) -> int:
         Stream.IMAGE: SOLVED_BYTES + PIXEL_BYTES * info.n_pixels,
         Stream.TOUCHES: SOLVED_BYTES + TOUCHES_BYTES,
         Stream.EVENTS: EVENTS_BYTES,
-        Stream.DRIVE_TOUCHES: info.n_electrodes * (DRIVE_TOUCHES_BYTES + PACKET_BYTES) - PACKET_BYTES,
+        Stream.DRIVE_TOUCHES: info.n_electrodes * (DRIVE_TOUCHES_BYTES + PACKET_BYTES)
+        - PACKET_BYTES,
     }
     return sum(size + PACKET_BYTES + size // 254 for kind, size in kinds.items() if kind & what)
 

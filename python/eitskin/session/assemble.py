@@ -8,8 +8,8 @@ from eitskin.device.link import FramePart, Streamed
 from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import (
-    Fault,
     DriveTouches,
+    Fault,
     FrameEvents,
     RawFrame,
     SolvedImage,

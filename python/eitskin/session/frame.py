@@ -19,7 +19,7 @@ from eitskin.device.known_model import KnownModel
 from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.explain import status_text
 from eitskin.device.wire.link_table import DriveTouch
-from eitskin.device.wire.packets import Fault, DriveTouches, RawFrame, Solved
+from eitskin.device.wire.packets import DriveTouches, Fault, RawFrame, Solved
 from eitskin.errors import MissingExtraError
 from eitskin.session.message import TrueTouch, frame_table, head, report_table, true_table
 from eitskin.solve.image_touches import touches_in_image

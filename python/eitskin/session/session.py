@@ -41,8 +41,8 @@ from eitskin.session.summary import Summary
 from eitskin.session.zones import refuse_off_skin
 
 KEPT_ON = (
-    "the board's owner has set keep-current: current flows on when this program ends;  eitskin board"
-    " --no-keep-current  changes that"
+    "the board's owner has set keep-current: current flows on when this program ends;  eitskin"
+    " board --no-keep-current  changes that"
 )
 TICK_S = 0.25  # of a real board: how soon a request, a stop or a lost port is noticed
 ALL_KINDS = Stream.RAW | Stream.IMAGE | Stream.TOUCHES

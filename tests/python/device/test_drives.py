@@ -11,7 +11,7 @@ from jsonschema import Draft202012Validator
 
 from eitskin.device.settings import ScanSettings
 from eitskin.device.wire.codec import Decoder, encode
-from eitskin.device.wire.link_table import DriveTouchesHead, DriveTouch, PacketType, Stream
+from eitskin.device.wire.link_table import DriveTouch, DriveTouchesHead, PacketType, Stream
 from eitskin.device.wire.payloads import MalformedPacket, pack, parse
 from eitskin.errors import DeviceError
 from eitskin.session.checks.host_check import check_recording

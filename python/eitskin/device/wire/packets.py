@@ -14,10 +14,10 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.gestures import GestureEvent
 from eitskin.device.wire.link_table import (
     Drive,
+    DriveTouch,
+    DriveTouchesHead,
     FaultCode,
     FaultPacket,
-    DriveTouchesHead,
-    DriveTouch,
     HashesPacket,
     InfoPacket,
     RawFlags,

@@ -14,10 +14,10 @@ from eitskin.core.results import known_touch
 from eitskin.device.wire.layout import Payload
 from eitskin.device.wire.link_table import (
     STAGES,
+    DriveTouch,
+    DriveTouchesHead,
     EventPacket,
     EventsHead,
-    DriveTouchesHead,
-    DriveTouch,
     PacketType,
     RawHead,
     StageStats,
@@ -27,8 +27,8 @@ from eitskin.device.wire.packets import (
     BoardHashes,
     BoardInfo,
     BoardStats,
-    Fault,
     DriveTouches,
+    Fault,
     FrameEvents,
     FromBoard,
     RawFrame,
@@ -145,7 +145,9 @@ def parse_drive_touches(payload: bytes) -> DriveTouches:
     parts = (rest[k : k + each.size] for k in range(0, len(rest), each.size))
     found = tuple(unpack(DriveTouch, part, "DRIVE_TOUCHES") for part in parts)
     if not np.isfinite([astuple(touch)[2:] for touch in found]).all():
-        raise MalformedPacket("DRIVE_TOUCHES: a touch whose place, velocity or strength is no number")
+        raise MalformedPacket(
+            "DRIVE_TOUCHES: a touch whose place, velocity or strength is no number"
+        )
     return DriveTouches(head, found)
 
 

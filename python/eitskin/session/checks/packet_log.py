@@ -9,8 +9,8 @@ from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.codec import Packet
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import (
-    Fault,
     DriveTouches,
+    Fault,
     FrameEvents,
     RawFrame,
     SolvedImage,
