@@ -6,7 +6,6 @@ from typing import Any
 from eitskin.cli.frame_line import line
 from eitskin.cli.printing import say
 from eitskin.cli.progress import bar
-from eitskin.core.results import NEWTONS_PER_GRAM
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import EitskinError, UsageError
 from eitskin.fileio import refuse_unwritable
@@ -18,7 +17,7 @@ from eitskin.view.film import check_film
 from eitskin.view.panels import check_picture
 from eitskin.view.stream_picture import Album, draw_stream, film_stream
 
-HEADER = "  time s  touch    x mm    y mm  radius mm  force g"
+HEADER = "  time s  touch    x mm    y mm  radius mm  force N"
 SCORED = "  off mm"
 
 
@@ -68,7 +67,7 @@ class Rows:
             rows.append(f"{frame.time_s:8.3f}      -")
         for number, touch in enumerate(frame.touches):
             time = f"{frame.time_s:8.3f}" if number == 0 else " " * 8
-            force = f"{touch.force_n / NEWTONS_PER_GRAM:.1f}" if touch.force_n else "-"
+            force = f"{touch.force_n:.3f}" if touch.force_n else "-"
             rows.append(
                 f"{time}  {touch.id:5d} {touch.x_mm:7.1f} {touch.y_mm:7.1f} {touch.radius_mm:10.1f}"
                 f" {force:>8}{self._off(frame, number)}"

@@ -93,12 +93,12 @@ class LearnedReference:
     outliers: int = 0
 
 
-NEWTONS_PER_GRAM = 9.80665e-3  # one gram-force at the standard acceleration of gravity
+NEWTONS_PER_GRAM = 9.80665e-3  # of a weight, at the standard acceleration of gravity
 
 
 def force_text(force_n: float) -> str:
-    """Return a force as text in grams-force, the unit that weights are marked with."""
-    return f"{force_n / NEWTONS_PER_GRAM:.1f} g"
+    """Return a force as text: in millinewtons below 1 N, else in newtons."""
+    return f"{1000 * force_n:.0f} mN" if force_n < 0.9995 else f"{force_n:.2f} N"
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from eitskin.core.results import NEWTONS_PER_GRAM, Reconstruction, solve_text
+from eitskin.core.results import Reconstruction, solve_text
 from eitskin.reconstruct.steps import ReconstructOutcome
 from eitskin.scoring.score import FrameScore
 from eitskin.session.message import frame_table, head, known
@@ -17,7 +17,7 @@ def to_text(outcome: ReconstructOutcome) -> str:
     results, scores = outcome.results, outcome.scores
     weighed = any(touch.force_n for result in results.values() for touch in result.touches)
     lines = [
-        f"frame       touch    x mm     y mm  radius mm  strength S/m mm2{'   force g' * weighed}  "
+        f"frame       touch    x mm     y mm  radius mm  strength S/m mm2{'   force N' * weighed}  "
         " error mm  solve"
     ]
     for number, result in results.items():
@@ -55,10 +55,10 @@ def _lines(
     errors = {} if score is None else score.errors_mm
     for k, touch in enumerate(result.touches):
         error = 10 * " " if score is None else f"{errors[k]:10.2f}" if k in errors else "     false"
-        grams = f"{touch.force_n / NEWTONS_PER_GRAM:10.1f}" if weighed else ""
+        force = f"{touch.force_n:10.3f}" if weighed else ""
         yield (
             f"{'' if k else label:11} {touch.id:5d} {touch.x_mm:8.2f} {touch.y_mm:8.2f}"
-            f" {touch.radius_mm:9.2f} {touch.strength_s_per_m_mm2:16.3f}{grams}  {error}"
+            f" {touch.radius_mm:9.2f} {touch.strength_s_per_m_mm2:16.3f}{force}  {error}"
             f"{'' if k else f'  {cost}'}".rstrip()
         )
     if info.diagnostics:

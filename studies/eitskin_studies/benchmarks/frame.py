@@ -1,5 +1,5 @@
-"""One frame through cffi: how long, how much of it outside C, beside the numpy reference and, where
-installed, pyEIT. Interleaved runs, ratios."""
+"""One frame through cffi: how long, how much of it outside C, beside the oracle in numpy and,
+where installed, pyEIT. Interleaved runs, ratios."""
 
 import importlib
 import importlib.util
@@ -50,7 +50,7 @@ class FrameTimes:
 def golden_session() -> tuple[
     CoreEngine, CoreEngine, CoreEngine, Reconstructor, np.ndarray[Any, Any]
 ]:
-    """The core, cold and warm, the portable core, the numpy reference, tared; and 32 noisy golden
+    """The core, cold and warm, the portable core, the oracle in numpy, tared; and 32 noisy golden
     frames (60 dB)."""
     model, blob = load_prebuilt()
     rng = np.random.default_rng(SEED)

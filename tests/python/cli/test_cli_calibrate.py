@@ -74,8 +74,8 @@ def test_presses_that_it_never_saw_read_their_load(folder, done, json_of):
         assert np.hypot(touch["x_mm"] - place[0], touch["y_mm"] - place[1]) < 1
         assert touch["force_n"] / NEWTONS_PER_GRAM == pytest.approx(grams, rel=SOME)
     text = done(f"reconstruct {folder / 'new.npz'} --model {folder / 'skin.eitm'}")
-    assert "force g" in text.splitlines()[0]
-    assert "force g" not in done(f"reconstruct {folder / 'new.npz'}").splitlines()[0]
+    assert "force N" in text.splitlines()[0]
+    assert "force N" not in done(f"reconstruct {folder / 'new.npz'}").splitlines()[0]
 
 
 def test_it_says_what_it_found(folder, done, json_of):
@@ -86,10 +86,10 @@ def test_it_says_what_it_found(folder, done, json_of):
     assert model.meta["calibration"] == {key: facts[key] for key in model.meta["calibration"]}
     assert facts["error_rms"] < 0.03 and facts["scatter_after"] < 0.03
     lines = done(*arguments).splitlines()
-    assert lines[0] == "50 presses at 10 places, up to 200.0 g"
+    assert lines[0] == "50 presses at 10 places, up to 1.96 N"
     assert lines[-1] == "not stored; name a model with -o"
     info = done(f"model info {folder / 'skin.eitm'}")
-    assert "up to 200.0 g, 95 % within" in info
+    assert "up to 1.96 N, 95 % within" in info
     assert "none; touches have no force" in done("model info")
     done(f"model verify {folder / 'skin.eitm'}")
 

@@ -70,6 +70,27 @@ def rms(frames: Frames) -> float:
     return float(np.sqrt(np.mean(frames.reference_voltage_v**2)))
 
 
+def with_dead(
+    frames: Frames, electrodes: tuple[int, ...], driving: bool, measuring: bool, seed: int
+) -> Frames:
+    """These electrodes float when they measure, drive no current, or both."""
+    rng = np.random.default_rng(seed)
+    reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
+    largest_v, noise_v = np.abs(reference).max(), 1e-3 * rms(frames)
+    for electrode in electrodes:
+        drives, measures = (
+            (ROWS[:, columns] == electrode).any(axis=1) for columns in ([0, 1], [2, 3])
+        )
+        floating = rng.uniform(-1, 1, 208) * largest_v
+        for values in (reference, voltage):
+            noise = noise_v * rng.normal(size=values.shape)
+            if measuring:
+                values[:, measures] = (floating + 20 * noise)[:, measures]
+            if driving:
+                values[:, drives] = noise[:, drives]
+    return changed(frames, reference, voltage)
+
+
 @pytest.mark.parametrize(
     "protocol",
     [
@@ -240,22 +261,18 @@ def test_joined_electrodes_are_named_whatever_their_width(width_mm, known):
 )
 def test_every_dead_electrode_is_named_with_its_side(driving, measuring):
     for electrode in range(16):
-        rng = np.random.default_rng(electrode)
-        frames = healthy_frames(electrode)
-        reference, voltage = frames.reference_voltage_v.copy(), frames.voltage_v.copy()
-        drives, measures = (
-            (ROWS[:, columns] == electrode).any(axis=1) for columns in ([0, 1], [2, 3])
-        )
-        floating = rng.uniform(-1, 1, 208) * np.abs(reference).max()
-        for values in (reference, voltage):
-            noise = 1e-3 * rms(frames) * rng.normal(size=values.shape)
-            if measuring:
-                values[:, measures] = (floating + 20 * noise)[:, measures]
-            if driving:
-                values[:, drives] = noise[:, drives]
-        finding = only(changed(frames, reference, voltage), "dead-electrode")
+        frames = with_dead(healthy_frames(electrode), (electrode,), driving, measuring, electrode)
+        finding = only(frames, "dead-electrode")
         assert finding.repair == f"--drop-electrodes {electrode}"
         assert ("driving" in finding.text, "measuring" in finding.text) == (driving, measuring)
+
+
+@pytest.mark.parametrize("dead", [(1, 3, 11), (6, 7, 12), (0, 1, 9)], ids=str)
+@pytest.mark.parametrize(("driving", "measuring"), [(True, True), (True, False), (False, True)])
+def test_three_dead_electrodes_are_named_instead_of_their_rows(dead, driving, measuring):
+    report = report_of(with_dead(healthy_frames(3), dead, driving, measuring, 3))
+    assert named(report) == [("dead-electrode", "fault")] * 3, report.lines()
+    assert tuple(sorted(one.evidence["electrode"] for one in report.findings)) == dead
 
 
 def test_an_electrode_lost_in_a_frame_is_named():

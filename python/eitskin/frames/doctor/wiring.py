@@ -2,11 +2,12 @@
 
 For joined electrodes the wire is added to the transfer matrix. An electrode is dead if nearly all
 rows that drive with it, or nearly all that measure with it, stand out or are silent, while all rows
-without it are unaffected.
+without it are unaffected. Up to four are looked for at once, because each hides the others.
 """
 
 from dataclasses import dataclass, replace
 from itertools import combinations
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -25,16 +26,17 @@ PREFER_JOINED = 1.25
 MOSTLY = 0.8
 LOST = 0.2
 SILENT = 0.1
-MAX_SUSPECTS = 8
+MAX_SETS = 600
 MAX_FAULTS = 4
 
 
 @dataclass(frozen=True)
 class Dead:
-    """Electrodes assumed dead, and the misfit of the rows without them."""
+    """Electrodes assumed dead, and the misfit and number of the rows without them."""
 
     electrodes: tuple[int, ...]
     misfit: float
+    rows_left: int
 
 
 def check_wiring(case: Case) -> tuple[Case, CheckOutcome]:
@@ -90,22 +92,28 @@ def check_lost(case: Case) -> CheckOutcome:
 
 
 def _best_dead(case: Case) -> Dead | None:
-    """Return the smallest set of suspects, one or two, without which the other rows are well
-    explained."""
-    suspects = _suspects(case)
-    sets: list[tuple[int, ...]] = [(e,) for e in suspects]
-    if len(suspects) <= MAX_SUSPECTS:
-        sets += combinations(suspects, 2)
-    best: Dead | None = None
-    for electrodes in sets:
-        others = case.trusted & ~touching(case.rows, electrodes)
-        dead = Dead(electrodes, misfit(case, others, case.magnitude) if others.any() else 1.0)
-        if best is not None:
-            better = 1 if len(electrodes) == len(best.electrodes) else BETTER_TIMES
-            if dead.misfit * better >= best.misfit:
-                continue
-        best = dead
+    """Return the smallest set of suspects without which the other rows are well explained.
+
+    A larger set must be BETTER_TIMES better. Sets of one size that are about as good differ where a
+    neighbour of two dead electrodes is suspected too; the set that leaves most rows is taken.
+    """
+    suspects, best = _suspects(case), None
+    for size in range(1, min(len(suspects), MAX_FAULTS) + 1):
+        if comb(len(suspects), size) > MAX_SETS:
+            break
+        sets = [_dead(case, electrodes) for electrodes in combinations(suspects, size)]
+        limit = BETTER_TIMES * min(dead.misfit for dead in sets)
+        alike = [dead for dead in sets if dead.misfit <= limit]
+        found = max(alike, key=lambda dead: (dead.rows_left, -dead.misfit))
+        if best is None or found.misfit * BETTER_TIMES < best.misfit:
+            best = found
     return best
+
+
+def _dead(case: Case, electrodes: tuple[int, ...]) -> Dead:
+    others = case.trusted & ~touching(case.rows, electrodes)
+    off = misfit(case, others, case.magnitude) if others.any() else 1.0
+    return Dead(electrodes, off, int(np.count_nonzero(others)))
 
 
 def _suspects(case: Case) -> list[int]:
