@@ -1,4 +1,4 @@
-"""What ``import eitskin`` gives beside classes: a skin's frames as they come, and models."""
+"""The functions that ``import eitskin`` gives: they stream a skin's frames and load models."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -102,7 +102,7 @@ def stream(
 
 
 def session_facts(session: Session) -> dict[str, Any]:
-    """What a session amounted to, for JSON."""
+    """Return the summary of a session, for JSON."""
     truth = None if session.observer is None else session.observer.facts()
     return session.finish().as_dict() | {"truth": truth}
 

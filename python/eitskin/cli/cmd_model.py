@@ -284,8 +284,8 @@ def run_verify(options: argparse.Namespace) -> int:
 
 
 def _differences_to_numpy(model: Model, blob: bytes) -> dict[str, float]:
-    """Of the golden frame's image by the C core in either width to that by the oracle, over its
-    peak."""
+    """Return the difference between the C core's image of the golden frame, in either width, and
+    the oracle's, relative to the image's peak."""
     images = {}
     for engine in ENGINES:
         one = Reconstructor(model, engine=engine, blob=blob)

@@ -49,7 +49,7 @@ class Demo:
 
     @property
     def differences(self) -> dict[str, float]:
-        """Of the C core's images to numpy's: the greatest, over the peak."""
+        """The greatest difference between the C core's images and numpy's, relative to the peak."""
         image = self.results["numpy"].image
         peak = np.abs(image).max() or 1.0
         return {

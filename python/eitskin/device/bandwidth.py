@@ -1,4 +1,4 @@
-"""What a serial line carries: how many frames of which kinds, before packets must be dropped."""
+"""The capacity of a serial line: how many frames of which kinds it carries without drops."""
 
 from math import ceil
 

@@ -87,7 +87,7 @@ class CommandExchange:
 
     @property
     def counters(self) -> LinkCounters:
-        """What came over the link so far, gaps and refused packets included."""
+        """The counters of the link so far, including gaps and refused packets."""
         return self.link.counters
 
     def close(self) -> None:
@@ -125,7 +125,7 @@ class CommandExchange:
         return info
 
     def next_item(self, timeout_s: float) -> Streamed | None:
-        """What the board streamed next; None if nothing comes within ``timeout_s``."""
+        """Return the next streamed item; None if nothing comes within ``timeout_s``."""
         return self.link.next(timeout_s)
 
     def _recorded_info(self) -> BoardInfo:

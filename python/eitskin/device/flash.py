@@ -26,8 +26,8 @@ INSTALL = "install one:  apt install openocd  or  apt install stlink-tools  or  
 
 @dataclass(frozen=True)
 class FlashPlan:
-    """What will be run, in order: ``commands`` as argument lists, for ``tool``. ``bank_file`` holds
-    the model's bank, if one goes along."""
+    """The commands that will be run, in order, as argument lists for ``tool``. ``bank_file`` holds
+    the bank of the model, if a model is flashed too."""
 
     tool: str
     commands: tuple[tuple[str, ...], ...]

@@ -82,11 +82,11 @@ class HostBoard:
         self._lib.sim_start(self._sim)
 
     def receive(self, data: bytes) -> None:
-        """What the host sent; commands in it are carried out."""
+        """Give the board bytes from the host; it carries out the commands in them."""
         self._lib.sim_write(self._sim, self._ffi.from_buffer(data), len(data))
 
     def take_output(self) -> bytes:
-        """What the board has sent since the last call."""
+        """Return the bytes that the board has sent since the last call."""
         violation = self._lib.sim_violation(self._sim)
         if violation != self._ffi.NULL:
             what = self._ffi.string(violation).decode()

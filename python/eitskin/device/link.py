@@ -82,8 +82,8 @@ class Link(ABC):
 
     @abstractmethod
     def next(self, timeout_s: float) -> Streamed | None:
-        """What comes next; None if nothing does within ``timeout_s`` (of the board's time where it
-        has its own clock).
+        """Return the next item; None if nothing comes within ``timeout_s`` (of the board's time
+        if it has its own clock).
 
         Raises:
             DeviceError: the port is gone for good.

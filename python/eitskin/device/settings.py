@@ -1,4 +1,4 @@
-"""What a user asks of a board's scan and solver: only what is named is changed."""
+"""The settings of a board's scan and solver that a user names; only these are changed."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -14,7 +14,7 @@ from eitskin.model.model import Model
 class _Settings:
     @property
     def named(self) -> dict[str, Any]:
-        """What is to be changed."""
+        """The settings that are to be changed."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
 

@@ -101,7 +101,7 @@ class SimTransport(Transport):
         return self.board.ended and not self._loop
 
     def read(self, timeout_s: float) -> bytes:
-        """What the board sends; empty where it has nothing to do, or the scene is over."""
+        """Return the bytes that the board sends; none if it is idle or its scene has ended."""
         output = self.board.take_output()
         if self._loop and self.board.ended:
             self.board.begin_scene()

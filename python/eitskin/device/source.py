@@ -73,7 +73,7 @@ class Source:
         raise NotImplementedError
 
     def take_events(self) -> list[LinkEvent]:
-        """What happened to the instrument since the last call."""
+        """Return the events of the instrument since the last call."""
         return []
 
     def reopen(self) -> bool:

@@ -213,7 +213,7 @@ class BoardPackets:
 
 
 class RecordedPackets:
-    """What was recorded, of the kinds asked for."""
+    """The recorded packets of the kinds that were asked for."""
 
     def __init__(self, device: CommandExchange, what: Stream, every: int, frames: int) -> None:
         self._device, self._what = device, what

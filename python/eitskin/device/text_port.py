@@ -26,7 +26,7 @@ class LinePort:
     waits, keeps, cut, ended = True, False, False, False
 
     def read(self, timeout_s: float) -> bytes:
-        """What has come within ``timeout_s``."""
+        """Return the bytes that come within ``timeout_s``."""
         raise NotImplementedError
 
     def send(self, data: bytes) -> None:

@@ -110,7 +110,7 @@ class TextSource(Source):
         raise DeviceError(f"{self.name}: {reason}{waited}")
 
     def _find_period(self) -> None:
-        """Of a file, by the times of its first two frames."""
+        """Take a file's frame period from the times of its first two frames."""
         if self.period_s is not None or not self.synchronous or len(self._parsed) < 2:
             return
         first, second = (line.time_s for line, _ in (self._parsed[0], self._parsed[1]))

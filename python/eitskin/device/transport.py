@@ -76,7 +76,7 @@ class Transport(ABC):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this kind of device can do: a plain line without a clock of its own."""
+        """The capabilities of this kind of device: by default a line without its own clock."""
         return Capabilities()
 
     @abstractmethod
@@ -101,7 +101,7 @@ class Transport(ABC):
         return False
 
     def take_events(self) -> list[LinkEvent]:
-        """What happened to the line since the last call."""
+        """Return the events of the line since the last call."""
         return []
 
     @property
@@ -112,7 +112,7 @@ class Transport(ABC):
 
     @property
     def known_hashes(self) -> BoardHashes | None:
-        """What a recording notes of its board's model and program; None: ask the board."""
+        """The hashes of model and program that a recording keeps; None: ask the board."""
         return None
 
     def begin_scene(self) -> int | None:

@@ -18,8 +18,8 @@ EMULATOR = Path("firmware", "emulator")  # Python, and no part of the image
 
 @dataclass(frozen=True)
 class Manifest:
-    """What an image was built from: the compiler's version line, SHA-256 of the sources and of the
-    image, its bytes."""
+    """The origin of an image: the compiler's version line, SHA-256 of the sources and of the image,
+    and its size in bytes."""
 
     compiler: str
     sources_sha256: str

@@ -62,12 +62,12 @@ class DiscFit:
 
     @cached_property
     def per_change(self) -> FloatArray:
-        """What a pixel adds to y for a change of 1 S/m in it (r, n); 0 where it does not count."""
+        """The change of y for a change of 1 S/m in each pixel (r, n); 0 if it does not count."""
         weight = self.model.column_weight.astype(float)
         return np.asarray(self.s / np.where(weight != 0, weight, np.inf))
 
     def answer(self, disc: Disc) -> FloatArray:
-        """What the disc adds to y (r,)."""
+        """Return the change of y (r,) that the disc causes."""
         covers = cover(self.model.grid, disc.x_mm, disc.y_mm, disc.radius_mm)
         return np.asarray(self.per_change @ covers) * disc.change
 
@@ -88,7 +88,8 @@ class DiscFit:
         return float(np.sqrt(weight)) * off
 
     def parts(self, disc: Disc) -> FloatArray:
-        """What it adds to y, and less its prior (r + 1,): the cost's part that it moves."""
+        """Return the change of y by the disc, then its prior with a minus sign (r + 1,): the part
+        of the cost that depends on the disc."""
         answer = self.answer(disc)
         return np.append(answer, -self.prior(disc, answer))
 
@@ -168,8 +169,8 @@ class DiscFit:
         ]
 
     def explained(self, discs: Sequence[Disc], whole: float) -> FloatArray:
-        """What leaving each disc alone out would add to |residual|^2, the strengths of the others
-        fitted again, as a fraction of ``whole``."""
+        """Return by how much |residual|^2 would grow without each disc, as a fraction of ``whole``.
+        One disc is left out at a time, and the strengths of the others are fitted again."""
         answers = np.array([self.answer(disc) for disc in discs])
         out = []
         for k, own in enumerate(answers):
@@ -228,8 +229,9 @@ class DiscFit:
 
 
 def interaction(model: Model, discs: Sequence[Disc]) -> FloatArray:
-    """What the fields that discs add at each other add to the folded data (k,), in model volts, of
-    a model with fields: docs/reference/eitm-format.md, "FLDS"."""
+    """Return the interaction of the discs in the folded data (k,), in model volts: the effect of
+    the field that each disc causes at the others. The model must have fields
+    (docs/reference/eitm-format.md, "FLDS")."""
     assert model.fields is not None
     n, fields, out = model.protocol.n_electrodes, model.fields, np.zeros(len(model.fold.first))
     rows = model.protocol.drive_measure.astype(int)[model.fold.first].T

@@ -1,4 +1,4 @@
-"""What is wrong with a frame, by the rules of docs/reference/diagnostics.md."""
+"""The diagnostics of a frame, by the rules of docs/reference/diagnostics.md."""
 
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -18,7 +18,7 @@ from eitskin.oracle.whitening import singular
 
 @dataclass
 class Found:
-    """What was found in one frame, by the names of ``Info``; ``wanted`` diagnostics alone."""
+    """The diagnostics of one frame, by the names of ``Info``; only those in ``wanted`` are kept."""
 
     wanted: frozenset[str]
     names: set[str] = field(default_factory=set)
@@ -159,8 +159,8 @@ def outliers(model: Model, folded: Folded, ref: Reference, found: Found) -> Bool
 
 
 def predicted(model: Model, folded: Folded, which: IntArray) -> FloatArray:
-    """What the other folds predict for those in ``which``, by ridge regression on the model's
-    singular vectors; NaN where they do not determine it."""
+    """Predict the folds in ``which`` from the other folds, by ridge regression on the model's
+    singular vectors; NaN where the others do not determine them."""
     nothing = np.full(len(which), np.nan)
     if model.row_form is None or not folded.known.all():
         return nothing

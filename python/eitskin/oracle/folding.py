@@ -84,7 +84,7 @@ def fold_frame(
 
 
 def gain_drift(model: Model, ref: Reference, folded: Folded) -> FloatArray:
-    """What a change of all voltages by a common factor adds to the folded data (k,)."""
+    """Return the direction in the folded data (k,) of a common factor on all voltages."""
     if model.data_kind == "normalised":
         return folded.known.astype(float)
     used = np.zeros(len(ref.drift_v0), dtype=bool)

@@ -99,8 +99,8 @@ def odd_folds(model: Model, newer: FloatArray, older: FloatArray, used: BoolArra
 def changed_rows(
     model: Model, newer: FloatArray, older: FloatArray, used: BoolArray, odd: BoolArray
 ) -> BoolArray:
-    """Of the ``odd`` folds (k,) the row that changed more, and the other if it changed about as
-    much (m,)."""
+    """Return which rows (m,) are to blame for the ``odd`` folds (k,): in each fold the row that
+    changed more, and also the other one if it changed about as much."""
     change, out = np.where(used, np.abs(newer - older), 0.0), np.zeros(len(newer), dtype=bool)
     for first, second in zip(model.fold.first[odd], model.fold.second[odd], strict=True):
         most = max(change[first], change[second] if second >= 0 else 0.0)

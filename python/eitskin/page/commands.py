@@ -1,5 +1,5 @@
-"""What a page may ask for. Whatever needs the board goes through its session (``Session.ask``), so
-that each command gets an answer; may be called from any thread."""
+"""The commands of a page. A command that needs the board goes through the page's session
+(``Session.ask``), so that each one gets an answer; any thread may call them."""
 
 import threading
 from collections.abc import Callable
@@ -33,7 +33,7 @@ class PageCommands:
         self._reader = reader
 
     def do(self, what: object, value: object) -> Answer:
-        """What a page's message asks for."""
+        """Carry out the command in a page's message."""
         if what in ("play", "pause", "step"):
             return self.pace(str(what))
         if what == "speed":
@@ -64,7 +64,7 @@ class PageCommands:
         return self._changed(session, action)
 
     def mode(self, kinds: list[str]) -> Future[str]:
-        """What is streamed."""
+        """Choose what is streamed."""
         session = self._reader.live()
         if not kinds or not set(kinds) <= set(KINDS):
             raise UsageError(f"mode: choose from {', '.join(KINDS)}")

@@ -1,4 +1,4 @@
-"""What the page gets: the session's facts once, each frame in binary.
+"""The messages to the page: the session's facts once, and each frame in binary.
 
 A frame is one binary message of the WebSocket, little-endian:
 
@@ -52,7 +52,7 @@ def frame_bytes(number: int, frame: Frame) -> bytes:
 
 
 def setup_text(session: Session, may_command: bool) -> str:
-    """What does not change from frame to frame."""
+    """Return the facts that do not change from frame to frame."""
     board, how, solver = session.device.board, session.settings, session.solver
     mean_v = None if session.reference is None else session.reference.mean_v
     facts: dict[str, Any] = {

@@ -54,7 +54,7 @@ class PageClient:
         self._changed.set()
 
     async def next(self) -> str | bytes:
-        """What is to be sent next."""
+        """Wait for the next message to send, and return it."""
         while True:
             if self._texts:
                 return self._texts.popleft()

@@ -114,7 +114,7 @@ class PageServer:
 
     @property
     def address(self) -> str:
-        """What to open, without the token."""
+        """The address to open, without the token."""
         name = f"[{self.host}]" if ":" in self.host else self.host
         return f"http://{name}:{self.port}/"
 

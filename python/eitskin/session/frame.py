@@ -96,7 +96,7 @@ class ImagePeak:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What came of one frame.
+    """One frame with everything that is known about it.
 
     Attributes:
         number: the board's count, from 0, and again from 0 after 2^32.

@@ -14,7 +14,7 @@ class StreamGestures:
         self._gestures = Gestures(zones)
 
     def take(self, frame: Frame) -> tuple[GestureEvent, ...]:
-        """What happened in ``frame``; nothing where its touches are not known."""
+        """Return the events of ``frame``; none if its touches are not known."""
         if frame.board_events is not None:
             return frame.board_events + tuple(self._gestures.press_zones(frame.board_events))
         if not frame.has_touches or frame.refused is not None:

@@ -65,7 +65,7 @@ def frame_table(
     events: Sequence[dict[str, Any]] = (),
     info: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """What every frame's message has, of a board or of a file."""
+    """Return the fields that the message of every frame has, from a board or from a file."""
     return head("frame") | {
         "frame": number,
         "time_s": time_s,
@@ -86,7 +86,7 @@ def report_table(
     time_unix_s: float | None,
     touches: Sequence[DriveTouch],
 ) -> dict[str, Any]:
-    """What the message of touches after a drive has."""
+    """Return the message of the touches after a drive."""
     return head("report") | {
         "frame": frame,
         "drive": drive,
@@ -111,5 +111,5 @@ def true_table(touch: TrueTouch) -> dict[str, float]:
 
 
 def summary_message(facts: dict[str, Any]) -> dict[str, Any]:
-    """What a session amounted to."""
+    """Return the message with a session's summary."""
     return head("summary") | {"summary": facts}

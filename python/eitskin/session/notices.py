@@ -1,5 +1,5 @@
-"""What is worth a notice, in lines: faults, events of the link, and diagnostics of frames when they
-rise and when they go.
+"""Notices as lines: faults, events of the link, and diagnostics of frames when they rise and when
+they go.
 
 A board reports most diagnostics as faults, and all of them in the head of each frame. What both
 report makes one notice.
@@ -40,8 +40,8 @@ class Novelty:
         self._shown: dict[Key, int] = {}  # what the last frame showed: how many in a row
 
     def lines(self, message: Message) -> list[str]:
-        """What is new with ``message``: of a frame, what it shows and those before it did not, and
-        what has gone."""
+        """Return the lines for what is new in ``message``. In a frame, these are the diagnostics
+        that the frames before it did not have, and those that have gone."""
         if isinstance(message, Frame):
             return [] if message.info is None else self._found(message.info)
         if isinstance(message, DriveReport):
@@ -108,7 +108,7 @@ def _plain(key: Key) -> str:
 
 
 def _found(solved: Solved) -> dict[Key, str]:
-    """What the head names, each with its text."""
+    """Return the diagnostics that the head names, each with its text."""
     electrodes = {
         "electrode open": solved.open_electrodes,
         "electrodes bridged": solved.bridged_electrodes,

@@ -23,7 +23,7 @@ class Observer(Protocol):
         """``frame`` with what is known of it."""
 
     def facts(self) -> dict[str, Any] | None:
-        """What it amounted to, for JSON; None: it saw nothing."""
+        """Return the summary for JSON; None if nothing was seen."""
 
     def lines(self) -> list[str]:
-        """The same for reading."""
+        """Return the summary as lines of text."""

@@ -113,7 +113,7 @@ class Slowness:
         self._start: tuple[float, int] | None = None
 
     def lines(self, time_us: int) -> list[str]:
-        """What is to be reported with the frame at ``time_us``."""
+        """Return what is to be reported with the frame at ``time_us``."""
         now = self._clock.now_s()
         if self._start is None:
             self._start = now, time_us

@@ -1,4 +1,4 @@
-"""What other threads ask of the thread that owns a board."""
+"""Requests of other threads to the thread that owns a board."""
 
 import threading
 from collections import deque

@@ -9,9 +9,9 @@ SIZE = 4096
 
 
 class Sample:
-    """Of all numbers that are added at most ``size``, each with the same chance (reservoir
-    sampling, Vitter's algorithm R, the same draws in every run): up to then all of them.
-    ``count`` and ``largest`` are of all."""
+    """A random sample of the numbers that are added: all of them up to ``size``, then ``size`` of
+    them, each with the same chance (reservoir sampling, Vitter's algorithm R, the same draws in
+    every run). ``count`` and ``largest`` cover all numbers."""
 
     def __init__(self, size: int = SIZE) -> None:
         self._size, self._draws = size, random.Random(0)

@@ -141,7 +141,7 @@ class Session:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What the kind of device can do."""
+        """The capabilities of this kind of device."""
         return self.device.transport.capabilities
 
     @property
@@ -366,7 +366,7 @@ class Session:
         return device
 
     def _find(self) -> None:
-        """What the settings leave to the board: its model, what is streamed, who observes it."""
+        """Decide what the settings leave open: the model, what is streamed, who observes."""
         how, board = self.settings, self.device.board
         if how.mode is None:
             how = replace(how, mode=ALL_KINDS if self.timed else Stream.IMAGE | Stream.TOUCHES)
@@ -428,7 +428,7 @@ class Session:
             self._say("touch it")
 
     def scan_and_solver(self) -> tuple[ScanSettings, SolverSettings]:
-        """As named; with a preset those of the measured point that it chooses."""
+        """Return the named settings, or with a preset those of the operating point it chooses."""
         return self.settings.scan_and_solver(self.device.board, self.known, self.name, self._say)
 
     def _carried(self) -> int:

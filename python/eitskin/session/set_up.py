@@ -1,4 +1,4 @@
-"""What comes before a board's frames: scan, solver, reference, and a scene's beginning."""
+"""The steps before a board's frames: scan, solver, reference, and the beginning of a scene."""
 
 from eitskin.core.results import Options
 from eitskin.device.client import Device

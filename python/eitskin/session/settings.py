@@ -67,8 +67,8 @@ class SessionSettings:
     def scan_and_solver(
         self, board: BoardInfo, known: KnownModel | None, name: str, say: Say
     ) -> tuple[ScanSettings, SolverSettings]:
-        """As named; with a preset those of the measured point that it chooses for the board's
-        ``known`` model; ``name`` is the board's."""
+        """Return the named settings. With a preset, return those of the operating point that it
+        chooses for the board's ``known`` model; ``name`` is the board's name."""
         scan, named, preset = self.scan, self.solver, self.preset
         if preset is None:
             return scan, named
@@ -87,7 +87,7 @@ class SessionSettings:
         return scan, replace(SolverSettings(**kept), **own)
 
     def refuse_of_recording(self, name: str) -> None:
-        """A recording takes no settings."""
+        """Refuse settings for a recording, which takes none."""
         named: dict[str, Any] = {**self.scan.named, **self.solver.named}
         if self.preset is not None:
             named["preset"] = True

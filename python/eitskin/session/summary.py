@@ -1,4 +1,4 @@
-"""What a session amounted to."""
+"""The summary of a session."""
 
 from dataclasses import dataclass, field
 from typing import Any

@@ -93,7 +93,8 @@ def reply_text(reply: Reply) -> str:
 
 
 def fault_text(fault: Fault) -> str:
-    """What went wrong on the board (or that it is over), in which frame, and what to do."""
+    """Return a text that says what went wrong on the board, or that it is over, in which frame, and
+    what to do."""
     if fault.code in FOUND_FAULTS:
         name, text = found_name(fault), _FOUND[FaultCode(fault.code)]
     elif fault.code in list(FaultCode):
@@ -108,7 +109,8 @@ def fault_text(fault: Fault) -> str:
 
 
 def found_name(fault: Fault) -> str:
-    """What was found in a frame, by name: "electrode 5 open"; for a code of ``FOUND_FAULTS``."""
+    """Return the name of a frame's diagnostic, such as "electrode 5 open", for a code of
+    ``FOUND_FAULTS``."""
     pair = fault.raised and fault.value >= 0
     names = {
         FaultCode.ELECTRODE_OPEN: f"electrode {fault.index} open",

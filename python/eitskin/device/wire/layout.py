@@ -1,4 +1,4 @@
-"""What the payloads of ``link_table`` are made of: the order of their fields on the wire."""
+"""The layout of the payloads of ``link_table``: the order of their fields on the wire."""
 
 from __future__ import annotations
 

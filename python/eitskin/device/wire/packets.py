@@ -1,5 +1,5 @@
-"""What travels from a board: payloads with what Python adds to their fields, which are those of
-``link_table``. Their bytes are in ``payloads``; commands, the other way, in ``commands``.
+"""The packets from a board. Each has the fields of its row in ``link_table``, and the properties
+that Python adds. ``payloads`` reads their bytes; ``commands`` holds the packets to a board.
 """
 
 import math
@@ -140,13 +140,13 @@ class RawFrame:
 
     @property
     def untouched(self) -> bool:
-        """Of a tare."""
+        """Whether this frame belongs to a tare."""
         return bool(self.flags & RawFlags.REFERENCE)
 
 
 @dataclass(frozen=True)
 class Solved(SolvedPacket):
-    """What the board's core says of a frame and its solve, and the times. ``status`` is 0 or an
+    """The report of the board's core on a frame and its solve, and the times. ``status`` is 0 or an
     eits_status (negative), ``stop`` one of ``STOPS``."""
 
     def as_dict(self) -> dict[str, Any]:
@@ -193,7 +193,7 @@ class DriveTouches:
 
 @dataclass(frozen=True)
 class FrameEvents:
-    """What happened in a frame whose scan began at ``time_us``, as the board's core tells it."""
+    """The events that the board's core reports for a frame whose scan began at ``time_us``."""
 
     frame: int
     time_us: int

@@ -16,7 +16,7 @@ LATE_IN_A_ROW = 8
 
 @dataclass
 class LinkCounters:
-    """What came over a link, counted since it was opened.
+    """Counters of the packets over a link since it was opened.
 
     ``skipped_bytes`` came before the first delimiter, ``malformed`` had a right checksum but a
     payload that is not of its type, ``missing`` packets lie in ``gaps`` gaps (as far as numbers

@@ -1,2 +1,2 @@
-"""What is collected from a session's frames, or checked with them: raw frames for files, a board
-before the doctor, and whether a board computes the same bits as this host."""
+"""Collectors and checks of a session's frames: raw frames for files, a board's data for the doctor,
+and whether a board computes the same bits as this host."""

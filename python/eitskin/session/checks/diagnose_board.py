@@ -28,8 +28,8 @@ NOT_FOR_THE_SKIN = frozenset(
 
 @dataclass(frozen=True, eq=False)
 class MeasuredBoard:
-    """What a board gave: ``untouched`` and ``touched`` frames, what it is, what it counted (None: a
-    recording)."""
+    """The data of a board: ``untouched`` and ``touched`` frames, its identity, and its counters
+    (None for a recording)."""
 
     untouched: RawRun
     touched: RawRun

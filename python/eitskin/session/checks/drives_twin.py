@@ -35,7 +35,7 @@ class DrivesTwin:
         self.same = self.different = 0
 
     def hear(self, packet: DriveTouches) -> None:
-        """Of a drive; its frame comes later."""
+        """Keep the touches after a drive; its frame comes later."""
         head = packet.head
         self._reported[head.frame][head.drive] = _numbers(packet.touches)
         self._begun[head.frame] = head.begun
@@ -72,8 +72,8 @@ class DrivesTwin:
         return np.asarray(aligned.volts) if aligned.trusted else None
 
     def found(self, result: Reconstruction) -> Reconstruction:
-        """What the solver found in the last frame: drives hear of it with the next; with the
-        diagnostics that are reported."""
+        """Keep the touches that the solver found in the last frame, which the drives of the next
+        one take into account; return the result with the diagnostics that are reported."""
         self._found = result.touches
         return replace(result, info=self._fast.named(result.info))
 

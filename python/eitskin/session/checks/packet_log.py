@@ -24,7 +24,7 @@ _Content = RawFrame | SolvedImage | SolvedTouches | DriveTouches | FrameEvents |
 
 
 class PacketLog:
-    """What ``device`` sends from now on, until ``stop``."""
+    """A log of the packets that ``device`` sends from now on, until ``stop``."""
 
     def __init__(self, device: Device) -> None:
         self._device = device
