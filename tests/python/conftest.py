@@ -30,7 +30,7 @@ def pytest_sessionstart() -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def meshes_are_kept() -> Iterator[None]:
-    """Netgen is a process of its own, about half a second a mesh."""
+    """A process of its own for each mesh would take most of the time of small models."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("eitskin.fem.mesh.run_mesher", mesher_that_keeps())
         yield

@@ -4,6 +4,7 @@ used."""
 import numpy as np
 from bytes_damage import any_bytes, bounded, read_or_refuse, written
 from hypothesis import given
+from hypothesis import strategies as st
 
 from eitm_bytes import sealed
 from eitskin.core.engine import CoreEngine
@@ -12,8 +13,11 @@ from eitskin.model.eitm import encode_model, load_model
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import tiny_blob
 
-WHOLE = [tiny_blob(storage) for storage in ("f32", "f16", "i16", "i8")]
 ENOUGH_WORK = 10_000
+
+
+def damaged_models() -> st.SearchStrategy[bytes]:
+    return any_bytes([tiny_blob(storage) for storage in ("f32", "f16", "i16", "i8")])
 
 
 def resealed(content: bytes) -> bytes:
@@ -24,7 +28,7 @@ def resealed(content: bytes) -> bytes:
         return content
 
 
-@given(content=any_bytes(WHOLE))
+@given(content=st.deferred(damaged_models))
 @bounded(150)
 def test_a_damaged_model_is_refused_in_a_line(tmp_path, content):
     path = written(tmp_path, "x.eitm", content)
@@ -32,7 +36,7 @@ def test_a_damaged_model_is_refused_in_a_line(tmp_path, content):
         assert read_or_refuse(CoreEngine, content, prepared=False) is None
 
 
-@given(content=any_bytes(WHOLE).map(resealed))
+@given(content=st.deferred(damaged_models).map(resealed))
 @bounded(250)
 def test_a_damaged_model_with_a_right_checksum_is_refused_or_used(tmp_path, content):
     path = written(tmp_path, "x.eitm", content)

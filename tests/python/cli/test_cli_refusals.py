@@ -122,11 +122,9 @@ def test_a_golden_image_of_other_bits_fails_verification(tmp_path, ran):
 
 # ---- frames ----
 
-FIRST = session().frames_v[:1]
-
 
 def with_nan(count: int) -> np.ndarray:
-    values = FIRST.copy()
+    values = np.full((1, 208), 1e-3)
     values[0, :count] = np.nan
     return values
 
@@ -186,7 +184,7 @@ def test_references_that_cannot_be_used(value, text, refused, changed_frames, tm
     ],
 )  # fmt: skip
 def test_frames_files_that_cannot_be_read(changes, code, text, refused, changed_frames, tmp_path):
-    own = {"voltage_v": FIRST, "frame_name": np.array(["a"])}
+    own = {"voltage_v": session().frames_v[:1], "frame_name": np.array(["a"])}
     path = changed_frames(truth=False, **(own | changes))
     outputs = f"-o {tmp_path / 'out.npz'} --picture {tmp_path / 'out.png'}"
     line = refused(code, f"reconstruct {path}", outputs)

@@ -15,6 +15,7 @@ from eitskin.fem.mesh import Mesh, build_mesh, mesh_for_elements, run_mesher
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk, polygon
 from eitskin.skin.skin import Skin, paper_skin
+from kept_meshes import made_here
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -195,6 +196,15 @@ def test_a_mesher_that_fails_gives_one_line():
     with pytest.raises(GeometryError, match=r"the mesher failed .*KeyError.*simplify") as caught:
         run_mesher({"pieces": []}, 30, "bad")
     assert "\n" not in str(caught.value)
+
+
+def test_the_mesher_gives_the_same_arrays_as_the_tests_do_without_a_process():
+    pieces = [[0, 0, None, 1.0], [10, 0, None, 1.0], [10, 10, None, 1.0], [0, 10, None, 1.0]]
+    request = {"max_size": 2.0, "pieces": pieces}
+    made = made_here(request)
+    assert made is not None and len(made[1]) > 50
+    for one, other in zip(run_mesher(request, 30, "square"), made, strict=True):
+        assert np.array_equal(one, other)
 
 
 def test_the_worker_starts_light():

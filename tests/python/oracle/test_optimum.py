@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sklearn import linear_model
 
 from eitskin.core.engine import CoreEngine
 from eitskin.core.options_table import SOLVERS
@@ -29,6 +28,8 @@ def problem(seed: int, sign: str, share: float, *, drift: bool = True) -> Lasso:
 
 def scikit_learns(p: Lasso) -> np.ndarray:
     """Its coordinate descent divides by the number of rows, and so lambda too."""
+    from sklearn import linear_model  # takes seconds: not while the tests are collected
+
     turn = -1.0 if p.sign == "decrease" else 1.0
     solver = linear_model.Lasso(
         alpha=p.lam / len(p.y),
