@@ -10,7 +10,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import hypothesis
 import numpy as np
 import pytest
 
@@ -21,7 +20,6 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BUILD = ROOT / "build"
 NEEDED = ("dask", "pyeit", "sklearn", "celer", "daqp", "unicorn", "netgen", "matplotlib")
-hypothesis.settings.register_profile("fixed", derandomize=True)  # the short tier's
 
 
 def pytest_sessionstart() -> None:

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
-import hypothesis
 import pytest
 
 from cross_build import shared_build
@@ -18,7 +17,6 @@ from margins import (  # noqa: F401
 )
 
 NEEDED = ("matplotlib", "netgen", "scipy", "skfem", "sklearn", "unicorn")
-hypothesis.settings.register_profile("fixed", derandomize=True)  # the short tier's
 
 
 def pytest_sessionstart() -> None:
