@@ -16,6 +16,14 @@ from margins import (  # noqa: F401
     pytest_unconfigure,
 )
 
+# The files that take longest, first: two workers that share the files then end together.
+LONGEST = (
+    "emulated/test_same_bits.py", "teaching/test_teach.py", "page/test_in_a_browser.py",
+    "solve/test_reconstructor.py", "model/test_model_errors.py", "teaching/test_update.py",
+    "hard_cases/test_columns.py", "model/test_build.py", "fem/test_cem.py",
+    "cli/test_cli_model.py", "fem/test_mesh.py", "frames/test_doctor.py",
+    "emulator/test_emulated_board.py",
+)  # fmt: skip
 NEEDED = ("matplotlib", "netgen", "scipy", "skfem", "sklearn", "unicorn")
 
 
@@ -24,6 +32,13 @@ def pytest_sessionstart() -> None:
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         raise pytest.UsageError(f"no {', '.join(missing)} here: pip install -e '.[test]'")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the tests of LONGEST first; all others keep their order."""
+    folder = Path(__file__).resolve().parent
+    place = {folder / name: k for k, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path, len(place)))
 
 
 @pytest.fixture(scope="session", autouse=True)
