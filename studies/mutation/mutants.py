@@ -48,7 +48,7 @@ class Mutant:
 
     @property
     def key(self) -> tuple[str, str, str, str]:
-        """What a judgement names it by."""
+        """The words by which survivors.toml names this mutant."""
         return self.file, self.function, self.before, self.after
 
     @property

@@ -37,14 +37,15 @@ NO_MUTANT = ("refused", "same")
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a mutant; ``noticed`` is empty where it survived."""
+    """The outcome of a mutant; ``noticed`` is empty if it survived."""
 
     mutant: Mutant
     noticed: str
 
 
 def all_mutants(files: Iterable[str], only: str, seed: str) -> list[Mutant]:
-    """Of these sources, in the order in which samples take them: another one for each seed."""
+    """Return the mutants of these sources in the order in which samples take them; each seed gives
+    another order."""
     found = [mutant for file in files for mutant in mutants_of(file)]
     return sorted(
         (m for m in found if only in f"{m}"),
@@ -59,7 +60,7 @@ def read_judged() -> set[tuple[str, str, str, str]]:
 
 
 def read_mistakes() -> list[Mutant]:
-    """What is picked by hand. The text to change must be in its file once."""
+    """Return the mistakes that were picked by hand. The text to change must be in its file once."""
     made = []
     for row in tomllib.loads((TOOLS / "mistakes.toml").read_text())["mistake"]:
         source = (ROOT / row["file"]).read_text()
@@ -115,8 +116,9 @@ def try_c(
 
 
 def max_survivors(count: int, least: float) -> int:
-    """Of so many mutants, that ``least`` per cent are noticed; of a small sample as many as chance
-    leaves in 19 of 20 samples where just that rate is met."""
+    """Return how many of ``count`` mutants may survive if ``least`` per cent must be noticed. Of a
+    small sample, as many may survive as chance leaves in 19 of 20 samples that just meet the
+    rate."""
     missed = 1 - least / 100
     if count >= WHOLE_SAMPLE or missed == 0:
         return int(missed * count + 1e-9)

@@ -118,7 +118,7 @@ def list_tests(library: Library) -> None:
 
 @functools.cache
 def sanitizer() -> str:
-    """What the loader must take first: the compiler's run-time library."""
+    """Return the library that the loader must take first: the compiler's run-time library."""
     asked = ["cc", "-print-file-name=libasan.so"]
     return subprocess.run(asked, check=True, capture_output=True, text=True).stdout.strip()
 
@@ -216,7 +216,7 @@ class Workshop:
 
 
 def sources() -> list[str]:
-    """What is changed: those that are compiled on a host."""
+    """Return the sources that are changed: those that are compiled on a host."""
     build = (ROOT / folder for folder in LIBRARIES)
     files = (file.relative_to(ROOT).as_posix() for folder in build for file in folder.rglob("*.c"))
     return sorted(file for file in files if not file.endswith("/m7.c"))

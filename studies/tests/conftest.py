@@ -1,4 +1,4 @@
-"""What every test of the studies may use."""
+"""Fixtures for every test of the studies."""
 
 import fcntl
 import hashlib

@@ -1,4 +1,4 @@
-"""What all experiments' tests ask of their runs and pages."""
+"""Checks that the tests of all experiments make of runs and pages."""
 
 import re
 from collections.abc import Callable
@@ -35,7 +35,7 @@ def coarse(folder: Path, share: float, elements: int = 2500, seed: int = 1) -> W
 
 
 def page_copy(folder: Path, name: str) -> Path:
-    """Of a page of the results, in ``folder``."""
+    """Return a copy of a page of the results, in ``folder``."""
     copy = folder / f"{name}.md"
     copy.write_bytes((PAGES / copy.name).read_bytes())
     return copy

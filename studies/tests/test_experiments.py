@@ -1,4 +1,4 @@
-"""What all experiments have in common: their names and pages, the command, the files that they
+"""Common to all experiments: their names and pages, the command, the files that they
 leave."""
 
 import json

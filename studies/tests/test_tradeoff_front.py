@@ -1,4 +1,4 @@
-"""What nothing beats, on made-up points; what the recorded results must show, and what ships of
+"""The Pareto front of made-up points; what the recorded results must show, and what ships of
 them."""
 
 import json

@@ -1,4 +1,4 @@
-"""What a frame costs on the board: exact instruction counts under QEMU, memory, and the frame rate
+"""The cost of a frame on the board: exact instruction counts under QEMU, memory, and the frame rate
 of the emulated NUCLEO-F767ZI.
 
 Instructions are exact. Times on silicon are an estimate from them: one a cycle at 216 MHz. A
@@ -105,7 +105,7 @@ class BoardRate:
 
     @property
     def bound(self) -> str:
-        """What the frame rate is bounded by."""
+        """The stage that bounds the frame rate."""
         return "solve" if self.solve_us_p50 > self.acquire_us else "acquisition"
 
 

@@ -48,8 +48,8 @@ NORMAL_95 = 1.96
 
 @dataclass(frozen=True)
 class Mean:
-    """Of differences over scenes: their mean, half of its 95 % interval (1.96 standard errors), the
-    mean of the worst tenth."""
+    """Statistics of differences over scenes: their mean, half of its 95 % interval (1.96 standard
+    errors), the mean of the worst tenth."""
 
     mean: float
     half_95: float
@@ -235,7 +235,7 @@ def _look_at(
 
 
 def mean_of(differences: Iterable[float]) -> Mean | None:
-    """Of one number a scene; None where there is none."""
+    """Return the statistics of one number per scene; None if there is none."""
     values = np.sort(np.asarray(list(differences), dtype=np.float64))
     if not len(values):
         return None

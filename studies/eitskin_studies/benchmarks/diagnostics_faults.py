@@ -1,4 +1,4 @@
-"""What can be wrong with a frame, and by which name it ought to be called."""
+"""The faults of a frame, each with the name that its diagnostic should have."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -73,7 +73,8 @@ def _rubs(case: SceneCase, values: FloatArray) -> FloatArray:
 
 
 def _channel_times(gain: float) -> Spoil:
-    """Of the channel that measures from the electrode to its neighbour."""
+    """Return a fault: a wrong gain of the channel that measures from the electrode to its
+    neighbour."""
     return lambda case, values: np.asarray(
         np.where(ROWS[:, 2] == case.electrode, gain * values, values)
     )

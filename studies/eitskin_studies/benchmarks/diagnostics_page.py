@@ -134,8 +134,8 @@ def summary(result: Findings) -> str:
 
 
 def false_alarms(result: Findings) -> str:
-    """Of clean frames; where there was none, the rate that would show one in 95 % of such runs is 3
-    over their number."""
+    """Return a line on false alarms in clean frames. If there was none, it names the rate that
+    would show one in 95 % of such runs: 3 over the number of frames."""
     clean = [result.rate(NONE, snr) for snr in SNRS_DB]
     other, frames = (
         sum(round(one.other * one.scenes) for one in clean),

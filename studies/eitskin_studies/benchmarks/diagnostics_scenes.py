@@ -73,7 +73,7 @@ class SceneCase:
 
     @property
     def rms_v(self) -> float:
-        """Of V0, the untouched skin's frame."""
+        """The rms of V0, the untouched skin's frame."""
         return float(np.sqrt(np.mean(self.volts["quiet"] ** 2)))
 
     def measured(self, exact_v: FloatArray, snr_db: float, what: str) -> FloatArray:

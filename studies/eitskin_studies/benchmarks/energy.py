@@ -1,4 +1,4 @@
-"""What a frame takes from the supply, estimated: data sheets' typical currents, times of the
+"""The energy of a frame, estimated: data sheets' typical currents, times of the
 measured trade-off.
 
 While frames follow each other, everything analog is on, and the processor runs for solve and
@@ -37,7 +37,7 @@ class Part:
         return self.volts > 5
 
     def mw(self, asleep: bool = False) -> float:
-        """Of all of them, at the input of their supply."""
+        """The power of all of them, in mW, at the input of their supply."""
         current = self.asleep_ma if asleep and self.asleep_ma is not None else self.active_ma
         power = self.number * self.volts * current
         return power / BIPOLAR_EFFICIENCY if self.bipolar else power
@@ -106,7 +106,8 @@ def waiting_mw() -> dict[str, float]:
 
 
 def mean_mw(one: PointEnergy, rate_hz: float, waiting: float) -> float:
-    """Of frames at ``rate_hz``, each measured, then solved with the analog side already waiting."""
+    """Return the mean power at ``rate_hz`` if each frame is measured, and then solved while the
+    analog side already waits."""
     active_ms = one.scan_ms + SETTLE_MS
     measured = (measuring_mw() + RUNNING.mw(asleep=True)) * active_ms
     solved = (RUNNING.mw() + max(waiting - RUNNING.mw(asleep=True), 0)) * one.solve_ms
@@ -122,7 +123,7 @@ class EnergyResult:
 
     @property
     def cheapest(self) -> PointEnergy:
-        """Of those that keep it."""
+        """The first point that keeps the accuracy."""
         return next(one for one in self.points if one.miou >= KEPT_MIOU)
 
     def as_dict(self) -> dict[str, Any]:

@@ -37,8 +37,8 @@ SNR_DB, SCENES, SEED, ELEMENTS = 60.0, 8, 5, 3000
 
 @dataclass(frozen=True)
 class GrowthPoint:
-    """What is run: electrodes of the adjacent protocol, pixels across, rank, touches; ``sweep`` is
-    the series it stands in."""
+    """A size that is run: electrodes of the adjacent protocol, pixels across, rank, touches;
+    ``sweep`` is the series it stands in."""
 
     sweep: str
     electrodes: int = 16

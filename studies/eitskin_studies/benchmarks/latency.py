@@ -68,7 +68,7 @@ class Press:
 
 @dataclass(frozen=True, eq=False)
 class Reported:
-    """What one frame or drive reported: measured from ``began_s`` to ``ended_s`` on the scene's
+    """The report of one frame or drive: measured from ``began_s`` to ``ended_s`` on the scene's
     clock, places of touches (k, 2) in mm, names of diagnostics; how long after it the packet was
     made, and takes on the line. Where drives tell of touches, frames only tell of diagnostics."""
 
@@ -162,7 +162,7 @@ def _named(
 
 
 def _parts(place: Path, emulated: int, seed: int, order: str) -> dict[str, FloatArray]:
-    """What the emulated board and this host take, ms."""
+    """Return the times that the emulated board and this host take, in ms."""
     parts: dict[str, FloatArray] = {}
     if emulated:
         drawn = draw(emulated, 0.03, seed + 1)
@@ -235,7 +235,8 @@ def follow(
     model: Path | None,
     report: str = "frame",
 ) -> Iterator[Reported]:
-    """What a board, "sim" or "emu", tells of ``presses``, frame by frame or drive by drive."""
+    """Return what a board, "sim" or "emu", reports of ``presses``, frame by frame or drive by
+    drive."""
     scene = _written(place, f"{board}-{len(presses)}", presses, seed)
     settings = SessionSettings(
         mode=Stream.TOUCHES, tare=UNTOUCHED_FRAMES, model=model, every=1, report=report
@@ -281,9 +282,9 @@ def _places(item: Frame | DriveReport) -> FloatArray:
 def judge(
     method: str, rise_ms: int, sessions: Sequence[tuple[Sequence[Press], Sequence[Reported]]]
 ) -> Judged:
-    """What was reported of each press, session by session. False: a touch over ``FALSE_MM`` from
-    the press, a second one, one before the contact or over ``LINGER_S`` after the press has
-    gone."""
+    """Return the reports of each press, session by session. A report is false if it is a touch over
+    ``FALSE_MM`` from the press, a second one, one before the contact or over ``LINGER_S`` after the
+    press has gone."""
     scans, errors, later, counts, diagnosed = [], [], [], [], 0
     solved = [one for _, reported in sessions for one in reported if one.frame]
     for presses, reported in sessions:

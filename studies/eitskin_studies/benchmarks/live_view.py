@@ -1,4 +1,4 @@
-"""What the live page costs: the server's share of a core, and the time from a frame to its pixels
+"""The cost of the live page: the server's share of a core, and the time from a frame to its pixels
 in a browser, with no page, one, and several."""
 
 import json
@@ -183,7 +183,7 @@ def _cpu_s(pid: int) -> float:
 
 
 def _memory_mb(pid: int) -> float:
-    """Of a process, resident."""
+    """Return the resident memory of a process in MB."""
     return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 

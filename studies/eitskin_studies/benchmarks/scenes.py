@@ -1,4 +1,4 @@
-"""What scenes cost: each effect's price on one scene, frames of a moving touch, and a dataset of
+"""The cost of scenes: each effect's price on one scene, frames of a moving touch, and a dataset of
 static scenes.
 
 Runs are interleaved and medians reported; meshing is not timed but for the effect that needs a mesh

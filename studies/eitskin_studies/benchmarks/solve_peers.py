@@ -179,8 +179,8 @@ def spams(problems: Problems) -> list[Candidate]:
 
 
 def daqp(problems: Problems) -> list[Candidate]:
-    """Of the dual: the point nearest to y with S'u <= lambda, strictly convex in r numbers; x are
-    its multipliers."""
+    """Solve the dual: the point nearest to y with S'u <= lambda, strictly convex in r numbers; x
+    are its multipliers."""
     import daqp as package
 
     rank, n = problems.s.shape
@@ -291,7 +291,7 @@ PEERS: dict[str, tuple[str, Callable[[Problems], list[Candidate]]]] = {
 
 
 def versions() -> dict[str, str | None]:
-    """Of each peer; None where it is not installed."""
+    """Return the version of each peer; None if it is not installed."""
     found: dict[str, str | None] = {"numpy": np.__version__}
     for name in PEERS:
         try:

@@ -49,7 +49,7 @@ class Problems:
         return len(self.y)
 
     def objective(self, k: int, x: npt.NDArray[np.floating]) -> float:
-        """Of problem ``k`` at ``x`` (n,), in float64."""
+        """Return the objective of problem ``k`` at ``x`` (n,), in float64."""
         wide = np.asarray(x, dtype=np.float64)
         residual = self.y[k] - self.s @ wide
         return float(0.5 * residual @ residual + self.lam[k] * np.abs(wide).sum())

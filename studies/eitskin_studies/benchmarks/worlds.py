@@ -18,7 +18,7 @@ from eitskin_studies.worlds.worlds import WORLDS
 
 @dataclass(frozen=True)
 class Settings:
-    """What the command was given."""
+    """The settings of a run."""
 
     scenes: int
     seed: int

@@ -1,4 +1,4 @@
-"""What the files of ``eitskin bench`` share: a page to fill, limits of numbers, a bar."""
+"""Shared by the files of ``eitskin bench``: a page to fill, limits of numbers, a bar."""
 
 import argparse
 import json

@@ -1,5 +1,5 @@
-"""What a method is: it makes images of difference frames; a family is a method and its one
-parameter.
+"""Methods and families: a method makes images of difference frames; a family is a method with its
+one parameter.
 
 A method needs ``name`` and ``reconstruct``. Two things are optional: ``learn`` is given the
 untouched frames of a session before its difference frames, and ``touches`` finds positions by
@@ -26,7 +26,7 @@ class Method(Protocol):
 
     @property
     def name(self) -> str:
-        """What the table calls it."""
+        """The name in the table."""
 
     def reconstruct(self, dv: FloatArray) -> FloatArray:
         """Images (k, n) of difference frames (k, m) in V."""
@@ -66,7 +66,7 @@ class Family:
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What methods are built from.
+    """The data that methods are built from.
 
     Attributes:
         skin, protocol, grid: what is reconstructed.
@@ -87,7 +87,7 @@ class Setup:
 
     @property
     def linearisation(self) -> Linearisation:
-        """What a model is made of."""
+        """The linearisation from which a model is made."""
         return Linearisation(
             self.grid, self.jacobian, self.voltages_v, self.mesh_elements, self.electrode_fields
         )

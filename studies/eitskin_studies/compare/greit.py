@@ -32,7 +32,7 @@ POINTS = 24  # of a target, spread evenly over its disc
 
 @dataclass(frozen=True, eq=False)
 class GreitTraining:
-    """What training needs of its targets, whatever the noise.
+    """The properties of the targets that training needs, whatever the noise.
 
     Attributes:
         shown: D Y', (n, m).

@@ -41,7 +41,7 @@ TOUCH_THRESHOLDS = THRESHOLDS[4::5]
 
 @dataclass(frozen=True)
 class CompareSettings:
-    """What is compared on what.
+    """The methods that are compared, and the scenes.
 
     Attributes:
         scenes, train_scenes: how many to test on and to train on.
@@ -106,12 +106,13 @@ class CompareResult:
 
     @property
     def miou_summary(self) -> Summary:
-        """Of ``miou``; the worst tenth is the lowest."""
+        """The statistics of ``miou``; the worst tenth is the lowest."""
         return summarise(self.miou)
 
     @property
     def position_summary(self) -> Summary:
-        """Of the position errors in mm of all hits; the worst tenth is the highest."""
+        """The statistics of the position errors in mm of all hits; the worst tenth is the
+        highest."""
         return summarise([d for m in self.matchings for d in m.distances_mm], worst="high")
 
     @property

@@ -30,7 +30,7 @@ CSV_COLUMNS = (
 
 
 def header(comparison: Comparison) -> list[tuple[str, str]]:
-    """What was compared under which conditions: (subject, text) in order."""
+    """Return the conditions of a comparison as (subject, text), in order."""
     how, setup, train, test = (
         comparison.settings,
         comparison.setup,

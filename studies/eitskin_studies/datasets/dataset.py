@@ -65,7 +65,7 @@ class Job:
         return range(chunk * self.chunk, min((chunk + 1) * self.chunk, self.count))
 
     def manifest(self) -> dict[str, Any]:
-        """What ``dataset.json`` holds; two equal ones describe equal datasets."""
+        """Return the content of ``dataset.json``; equal contents describe equal datasets."""
         content = {
             "skin": skin_to_table(self.scene.skin),
             "scene": repr(self.scene),

@@ -47,7 +47,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Ranges:
-    """What a dataset draws; ``touches`` None keeps the scene's."""
+    """The ranges that a dataset draws from; ``touches`` None keeps the scene's touches."""
 
     touches: TouchRules | None
     numbers: tuple[Range, ...]

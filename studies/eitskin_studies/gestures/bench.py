@@ -23,7 +23,7 @@ WITHIN_S = 0.05
 
 @dataclass(frozen=True)
 class Settings:
-    """What the command was given."""
+    """The settings of a run."""
 
     sessions: int
     seed: int

@@ -52,7 +52,8 @@ class Finger:
 
 @dataclass(frozen=True)
 class DrawnGesture:
-    """What was done and when it ended: the last finger's lift, of two fingers the first one's.
+    """A gesture that was made, and when it ended: at the finger's lift, or with two fingers at the
+    first lift.
     ``direction_deg`` is a swipe's."""
 
     kind: str

@@ -38,8 +38,8 @@ class ReportedGesture:
 
 @dataclass
 class GestureCount:
-    """Of one session or of several added up: ``done`` gestures of each kind, ``right`` ones,
-    ``invented`` ones that no gesture accounts for, ``reported`` in all, gestures by whether a
+    """Counts of one session, or of several added up: ``done`` gestures of each kind, ``right``
+    ones, ``invented`` ones that no gesture accounts for, ``reported`` in all, gestures by whether a
     finger is light, what was taken for what, and the latency in s of each right one."""
 
     done: Counter[str] = field(default_factory=Counter)
@@ -58,7 +58,7 @@ class GestureCount:
 
     @property
     def right_gestures(self) -> int:
-        """Of them."""
+        """The number of right gestures of the kinds that are expected."""
         return sum(n for kind, n in self.right.items() if EXPECTED[kind])
 
     def add(self, other: "GestureCount") -> None:
@@ -75,7 +75,7 @@ class GestureCount:
 
 
 def reported_gestures(frames: Iterable[TouchedFrame], gestures: Gestures) -> list[ReportedGesture]:
-    """What ``gestures`` makes of the frames."""
+    """Return what ``gestures`` reports for the frames."""
     reported: list[ReportedGesture] = []
     for frame in frames:
         now_s = frame.time_us * 1e-6 + 1 / RATE_HZ

@@ -34,7 +34,7 @@ STATES_A_FRAME = 2
 
 @dataclass(frozen=True, eq=False)
 class TouchedFrame:
-    """What the core found in a frame whose scan began at ``time_us``."""
+    """The touches that the core found in a frame whose scan began at ``time_us``."""
 
     time_us: int
     touches: tuple[Touch, ...]

@@ -1,2 +1,2 @@
-"""What experiments and benchmarks share: runs on the emulated core, stored results, page
+"""Shared by experiments and benchmarks: runs on the emulated core, stored results, page
 sections."""

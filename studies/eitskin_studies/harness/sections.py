@@ -115,7 +115,7 @@ def _wrapped(text: str) -> str:
 
 
 def _part(table: Tabular, part: Mapping[str, Any], where: str) -> Tabular:
-    """Of a table what its page shows."""
+    """Return the part of a table that its page shows."""
     head, rows = table
     check_keys(part, ("page", "columns", "rows", "without", "intervals"), where)
 

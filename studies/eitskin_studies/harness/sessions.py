@@ -32,8 +32,8 @@ from eitskin_studies.harness.snr import FINE_BITS, FINE_CONVERTER_DB, noise_devi
 
 @dataclass(frozen=True)
 class Drift:
-    """What changed since the reference was taken, each uniformly by up to so much of itself: the
-    sheet's conductivity, each contact's impedance, the current's amplitude."""
+    """Changes since the reference was taken: the sheet's conductivity, each contact's impedance and
+    the current's amplitude. Each changes uniformly, by up to this fraction of itself."""
 
     sheet: float
     contact: float
@@ -42,8 +42,8 @@ class Drift:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredFrames:
-    """What a configuration gets: ``untouched_v`` (q, m), and ``frames_v`` (k, h, m): scene k held
-    for h frames, the last judged."""
+    """The frames that a configuration gets: ``untouched_v`` (q, m), and ``frames_v`` (k, h, m):
+    scene k held for h frames, the last judged."""
 
     untouched_v: FloatArray
     frames_v: FloatArray
@@ -231,7 +231,7 @@ def _facts_of(touch: TrueTouch) -> list[float | str]:
 
 
 def apparent_change_s_per_m_mm2(touch: TrueTouch, sheet_s_per_m: float) -> float:
-    """What a touch changes in all: its disc's area times 2 (c - 1) / (c + 1) of the sheet's
+    """Return the total change by a touch: its disc's area times 2 (c - 1) / (c + 1) of the sheet's
     conductivity, which is how a disc of contrast c answers. A linear method can find no more,
     however strong the contrast."""
     return (

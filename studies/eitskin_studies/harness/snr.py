@@ -1,4 +1,4 @@
-"""What an SNR means in every study: 20 log10(rms(V0) / sigma), of measurements of 80 samples."""
+"""The SNR of every study: 20 log10(rms(V0) / sigma), of measurements of 80 samples."""
 
 import math
 

@@ -41,7 +41,7 @@ class Store:
                 continue
 
     def get(self, facts: dict[str, Any]) -> Any:
-        """What was kept for ``facts``; None for nothing."""
+        """Return the value that was kept for ``facts``, or None."""
         return self._values.get(key_of(facts))
 
     def put(self, facts: dict[str, Any], values: Any) -> Any:

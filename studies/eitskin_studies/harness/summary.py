@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 @dataclass(frozen=True)
 class Summary:
-    """Of ``count`` values, in their own unit; all are nan where there are none.
+    """Statistics of ``count`` values, in their own unit; all are NaN if there are no values.
 
     Attributes:
         mean: arithmetic mean.

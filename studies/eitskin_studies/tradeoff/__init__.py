@@ -1,2 +1,2 @@
-"""What accuracy costs in time: configurations over one scale, measured on the same scenes, and
+"""The cost of accuracy in time: configurations over one scale, measured on the same scenes, and
 which to choose."""

@@ -27,7 +27,7 @@ DIGITS = 6
 
 @dataclass(frozen=True)
 class TrainedPoint:
-    """What was chosen on training scenes: ``threshold``, t of the mask x > t max(x), and
+    """The choices made on training scenes: ``threshold``, t of the mask x > t max(x), and
     ``force_scale``, what the strengths of found touches are multiplied by: the median of true over
     found."""
 

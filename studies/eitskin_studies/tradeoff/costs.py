@@ -1,4 +1,4 @@
-"""What a configuration costs without running it: flash, RAM, and the time to measure a frame."""
+"""The costs of a configuration that need no run: flash, RAM, and the time to measure a frame."""
 
 from typing import Any
 

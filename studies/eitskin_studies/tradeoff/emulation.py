@@ -98,7 +98,7 @@ def count_instructions(
 def _run(
     emulator: Emulator, one: Configuration, built: Built, untouched_v: Any, frames_v: Any
 ) -> tuple[EmulatedFrame, ...]:
-    """What the emulated core says of each frame."""
+    """Return the emulated core's result for each frame."""
     options = built.reconstructor(one).options
     with tempfile.TemporaryDirectory() as name:
         try:

@@ -51,7 +51,8 @@ def to_json(values: dict[str, Any]) -> str:
 
 
 def kept_cells(front: Front) -> Front:
-    """What is recorded: of the sets beside "random" 60 dB only, numbers to four decimals."""
+    """Return what is recorded: numbers to four decimals, and 60 dB alone of all sets but
+    "random"."""
     kept = []
     for one in front.points:
         scores = {

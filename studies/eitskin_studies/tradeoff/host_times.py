@@ -51,7 +51,7 @@ def host_times(
 
 
 def _row(times: FloatArray) -> dict[str, Any]:
-    """Of ``times`` (scenes, rounds) in us."""
+    """Return the statistics of ``times`` (scenes, rounds) in us."""
     return {
         "p50": round(float(np.median(times)), 1),
         "p99": round(float(np.percentile(times, 99)), 1),

@@ -87,7 +87,7 @@ def front_table(front: Front) -> Tabular:
 
 
 def preset_table(front: Front) -> Tabular:
-    """What each preset is on the board and on a host."""
+    """Return a table of the presets on the board and on a host."""
     points = [one for one in front.points if not one.configuration.warm_start]
     rows = []
     for board in ("f767", "host"):
@@ -111,7 +111,7 @@ def preset_table(front: Front) -> Tabular:
 
 
 def recommendation_table(front: Front) -> Tabular:
-    """What ``recommend`` chooses for times on the F767 and the host."""
+    """Return a table of what ``recommend`` chooses for times on the F767 and the host."""
     rows = []
     points = [one for one in front.points if not one.configuration.warm_start]
     for board, budgets in (("f767", F767_MS), ("host", HOST_MS)):

@@ -1,4 +1,4 @@
-"""What a user might take instead, on the same scenes: accuracy, and time on this host.
+"""Alternatives that a user might take, on the same scenes: accuracy, and time on this host.
 
 The scenes "train" and "random" are those of ``eitskin compare`` under the same seed, so that its
 numbers stand beside those of configurations.
@@ -31,8 +31,9 @@ def peer_families(setup: Setup) -> Sequence[Family]:
 def score_peers(
     skin: Skin, protocol: Protocol, settings: dict[str, Any], progress: Progress
 ) -> list[dict[str, Any]]:
-    """Of each method at its best parameter ``value``: mean image MIoU with its 95 % interval.
-    ``settings``: ``scenes``, ``train_scenes``, ``seed``, ``simulated_elements`` and ``snr_db``.
+    """The results of each method at its best parameter ``value``: mean image MIoU with its 95 %
+    interval. ``settings``: ``scenes``, ``train_scenes``, ``seed``, ``simulated_elements`` and
+    ``snr_db``.
 
     Raises:
         UsageError, GeometryError, MissingExtraError: as ``compare``.

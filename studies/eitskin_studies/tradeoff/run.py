@@ -94,7 +94,7 @@ class RunSettings:
 
 @dataclass(eq=False)
 class _Desk:
-    """What the steps of a run share."""
+    """The data that the steps of a run share."""
 
     settings: RunSettings
     store: Store
@@ -194,8 +194,8 @@ def run(
 
 
 def _world(settings: RunSettings, skin: Skin, protocol: Protocol) -> dict[str, Any]:
-    """What a result depends on besides its configuration: the core's own bytes among it, so that
-    another build measures again."""
+    """Return what a result depends on besides its configuration. The core's own bytes are part of
+    it, so that another build measures again."""
     module = load_core("float32")
     core = hashlib.sha256(Path(module.__file__).read_bytes()).hexdigest()[:16]
     counts = [

@@ -36,7 +36,7 @@ DRIFT = Drift(sheet=0.03, contact=0.1, amplitude=0.01)
 
 @dataclass(frozen=True)
 class SceneSet:
-    """What is touched in a set of scenes. ``draw`` takes outline, seed and count; ``drifts``: the
+    """The touches of a set of scenes. ``draw`` takes outline, seed and count; ``drifts``: the
     skin has changed since the reference was taken. ``other_world``: touches are not what the model
     takes them for; such a set is measured where it is named."""
 

@@ -13,8 +13,8 @@ COSTS = ("flash_bytes", "ram_bytes", "pixels_kept", "acquisition_us")
 
 
 def x_of(point: OperatingPoint, where: Conditions) -> float | None:
-    """What the front is drawn over: mean instructions of solve and touches, or where none are known
-    MACs."""
+    """Return the cost that the front is drawn over: the mean instructions of solve and touches, or
+    MACs if no instructions are known."""
     if point.instructions is not None:
         return float(point.instructions["mean"])
     macs = point.macs(where)

@@ -25,7 +25,7 @@ DIGITS = 4
 
 
 class FoundTouch(Protocol):
-    """What is needed of a found touch."""
+    """The properties of a found touch that scoring needs."""
 
     @property
     def x_mm(self) -> float:
@@ -88,8 +88,8 @@ class WorldScore:
 
 
 class CoreFinder:
-    """What ``solver`` finds: a tare on the untouched frames, then the frame, with nothing before
-    it. ``diagnostics`` names what the core finds wrong with the last frame."""
+    """Return what ``solver`` finds: a tare on the untouched frames, then the frame, with nothing
+    before it. ``diagnostics`` names what the core finds wrong with the last frame."""
 
     def __init__(self, solver: Reconstructor) -> None:
         self.solver, self._own_sign = solver, solver.options.sign

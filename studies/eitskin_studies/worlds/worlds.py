@@ -1,4 +1,4 @@
-"""What a set of another world says: which touches there are, and what is wrong with the skin."""
+"""The sets of other worlds: their touches, and the errors of their skins."""
 
 from dataclasses import dataclass, field
 
@@ -32,7 +32,8 @@ class TouchKinds:
 
 @dataclass(frozen=True)
 class Errors:
-    """What the model does not know of the skin, drawn again for each scene. Standard deviations.
+    """The skin's errors that the model does not know, as standard deviations; each scene draws its
+    own.
 
     Attributes:
         contact_spread: each contact's impedance is the skin's times 1 + uniform(-s, s).
