@@ -37,7 +37,7 @@ class EmulatedBoard(BoardParts):
         return self.clock.now_s
 
     def report(self) -> BoardReport:
-        """What has happened so far."""
+        """Return a report of everything so far."""
         record = self.record
         return BoardReport(
             time_s=self.now_s,
@@ -84,12 +84,12 @@ class EmulatedBoard(BoardParts):
         self.line.send(data)
 
     def receive(self) -> bytes:
-        """What the host has received whole and not taken before."""
+        """Return the bytes that the host has received completely and not taken before."""
         self.usart.bring_up_to_date()
         return self.line.receive(self.clock.now)
 
     def bank(self, number: int) -> bytes:
-        """What a model bank holds."""
+        """Return the content of a model bank."""
         at = BANKS[number] - FLASH
         return self.memories.flash[at : at + BANK_BYTES]
 

@@ -48,7 +48,7 @@ class Bus:
             self._pages[(peripheral.base >> PAGE) + page] = peripheral
 
     def read(self, address: int, size: int) -> int:
-        """What a load of ``size`` bytes gives."""
+        """Return the value of a load of ``size`` bytes."""
         peripheral = self._pages.get(address >> PAGE)
         if peripheral is None or (
             peripheral.gate is not None and not self.gates.clocked(peripheral.gate)

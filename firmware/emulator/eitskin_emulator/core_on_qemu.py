@@ -93,18 +93,18 @@ class EmulatedFrame:
 
     @property
     def macs(self) -> int:
-        """Of solve and touches."""
+        """The multiply-accumulates of solve and touches together."""
         return self.solve_macs + self.touch_macs
 
     @property
     def instructions(self) -> int:
-        """Of solve and touches."""
+        """The instructions of solve and touches together."""
         return self.solve_instructions + self.touch_instructions
 
 
 @dataclass(frozen=True)
 class EmulatedRun:
-    """What a run printed: the last model's workspace in bytes, the name of its kernels, a result a
+    """The output of a run: the last model's workspace in bytes, the name of its kernels, a result a
     frame, drive and scan, the bytes of the last fast path (0: none), and the statuses of every
     model, choice of options, tare and fast path."""
 

@@ -1,4 +1,4 @@
-"""What ``tests/emulated/frames_m7.c`` can be told to do, and the files that tell it."""
+"""The steps that ``tests/emulated/frames_m7.c`` can run, and the files that list them."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

@@ -1,4 +1,4 @@
-"""What an emulated board has seen that a test wants to know, or a user should."""
+"""The events of an emulated board that tests or users need to know."""
 
 from collections import Counter
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What an emulated board did, in numbers: for tests, and for whoever wonders."""
+"""The work of an emulated board in numbers, for tests and for curious users."""
 
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""What happens when: events in the board's time, each at one time or none."""
+"""A schedule: events in the board's time, each at one time or none."""
 
 import heapq
 from collections.abc import Callable

@@ -63,7 +63,7 @@ class SerialLine:
             self.host_sends()
 
     def receive(self, at: int) -> bytes:
-        """What the board sent and the host has whole by ``at``."""
+        """Return the bytes that the board sent and the host has completely by ``at``."""
         return _take(self._up, at)
 
     def up_next_end(self) -> int:
@@ -82,8 +82,8 @@ class SerialLine:
             self._up.append(ByteRun(data, start + frame_ticks, frame_ticks))
 
     def to_board(self, at: int) -> tuple[bytes, int]:
-        """What has arrived at the board by ``at`` and was not taken before, and when the last of it
-        was whole."""
+        """Return the bytes that have arrived at the board by ``at`` and were not taken before, and
+        the time at which the last one was complete."""
         ends = [
             run.first_end + (run.ended(at) - 1) * run.frame_ticks
             for run in self._down
@@ -106,7 +106,7 @@ class SerialLine:
         return self._down[0].last_end if self._down else NEVER
 
     def clear(self) -> None:
-        """What is on its way is lost."""
+        """Lose the bytes that are on their way."""
         self._down.clear()
         self._up.clear()
 
@@ -125,7 +125,7 @@ def _take(runs: deque[ByteRun], at: int) -> bytes:
 
 
 def resampled(data: bytes, sent_frame_ticks: int, read_frame_ticks: int) -> bytes:
-    """What a receiver whose bits last ``read_frame_ticks`` / 10 makes of bytes sent at
+    """Return what a receiver whose bits last ``read_frame_ticks`` / 10 makes of bytes sent at
     ``sent_frame_ticks`` / 10 a bit."""
     bits = [bit for byte in data for bit in (0, *(byte >> k & 1 for k in range(8)), 1)]
     level = [*bits, 1, 1, 1, 1]

@@ -1,5 +1,5 @@
-"""What an experiment is, and the workspace that it works at: seeded, resumable, every result kept
-as it comes."""
+"""Experiments, and the workspace of one: seeded and resumable, with every result kept as it
+comes."""
 
 import hashlib
 import math
@@ -49,7 +49,7 @@ class ExperimentSettings:
 
     @property
     def tuning_seed(self) -> int:
-        """Of the sets that parameters and thresholds are chosen on."""
+        """The seed of the sets on which parameters and thresholds are chosen."""
         return 100_000 + self.seed
 
     def count(self, usual: int, least: int = 2) -> int:
@@ -68,7 +68,7 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class ExperimentOutcome:
-    """What came of an experiment.
+    """The results of an experiment.
 
     Attributes:
         tables: each is printed, written as CSV, and put between the marks of its name on the page.
@@ -95,8 +95,8 @@ class Workspace:
 
     @cached_property
     def world(self) -> dict[str, Any]:
-        """What every result depends on: the core's own bytes among it, so that another build
-        measures again."""
+        """Return what every result depends on. The core's own bytes are part of it, so that another
+        build measures again."""
         core = hashlib.sha256(Path(load_core("float32").__file__).read_bytes()).hexdigest()[:16]
         return {"version": __version__, "core": core}
 

@@ -1,4 +1,5 @@
-"""What an experiment leaves: data, tables, pictures, and the marked places of its page."""
+"""Writes the results of an experiment: data, tables, pictures, and the marked places of its
+page."""
 
 import csv
 import io

@@ -70,8 +70,8 @@ def draw_images(path: Path, *, skin: Skin, grid: Grid, results: Sequence[Algorit
 
 
 def draw_masks(path: Path, *, skin: Skin, grid: Grid, results: Sequence[AlgorithmResult]) -> None:
-    """What is taken for touch: two rows a scene, at the fixed parameter and t, and at the chosen
-    ones; raises as draw_images."""
+    """Draw the pixels that are taken for touches: two rows a scene, at the fixed parameter and t,
+    and at the chosen ones; raises as draw_images."""
     from matplotlib.patches import Patch
 
     kept = _kept(results)

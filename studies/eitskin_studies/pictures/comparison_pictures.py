@@ -18,7 +18,7 @@ def truth_marks(scene: TouchScene, sheet_s_per_m: float) -> tuple[Mark, ...]:
 
 
 def found_marks(result: CompareResult, scene: int) -> tuple[Mark, ...]:
-    """What a method found in one test scene."""
+    """Return the places that a method found in one test scene."""
     return tuple(Mark(float(x), float(y)) for x, y in result.found_mm[scene])
 
 

@@ -356,7 +356,7 @@ def mains(axes: Axes, session: EffectSession, parameters: Any) -> None:
 
 
 def common_mode(axes: Axes, session: EffectSession, parameters: Any) -> None:
-    """What is rejected against the rejection."""
+    """Draw the part of a common mode that is left, against the rejection."""
     decibels = np.linspace(20, 100, 100)
     axes.semilogy(decibels, 10 ** (-decibels / 20), color=STRONG)
     axes.plot(parameters.cmrr_db, 10 ** (-parameters.cmrr_db / 20), "o", color=FOUND)

@@ -1,4 +1,4 @@
-"""What each ablation gives for what it costs."""
+"""A picture of each ablation's accuracy against its cost."""
 
 from collections.abc import Mapping
 from pathlib import Path

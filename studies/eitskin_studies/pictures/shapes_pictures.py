@@ -18,7 +18,7 @@ MISSED = "#c62828"
 
 @dataclass(frozen=True, eq=False)
 class ShapePanel:
-    """What is drawn of a skin.
+    """The data that a skin's picture shows.
 
     Attributes:
         name: above its column.

@@ -1,4 +1,4 @@
-"""What accuracy costs, as pictures: the front with its names, one knob at a time, samples against
+"""Pictures of the cost of accuracy: the front with its names, one knob at a time, samples against
 noise, scenes, and the objective beside the picture."""
 
 from __future__ import annotations

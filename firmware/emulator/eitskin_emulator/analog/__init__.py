@@ -1,2 +1,2 @@
-"""What hangs on the processor's pins: generator, multiplexers, skin, converter's input; each says
+"""The parts at the processor's pins: generator, multiplexers, skin, converter's input; each says
 what it leaves out."""

@@ -92,7 +92,7 @@ class Ad9833:
             self._word(self._shift >> self._bits & 0xFFFF, frame.end)
 
     def _seen(self, frame: SpiFrame) -> int:
-        """What is on SDATA at the falling edges."""
+        """The bits on SDATA at the falling edges."""
         mask = (1 << frame.bits) - 1
         if frame.cpol != frame.cpha:
             return frame.value
@@ -159,7 +159,7 @@ class Ad9833:
 
     @property
     def frequency_hz(self) -> float:
-        """Of the output; 0: there is none."""
+        """The frequency of the output; 0: no output."""
         course = self.courses[-1]
         return course.step / FULL_TURN * self.mclk_hz if course.running else 0.0
 

@@ -75,7 +75,7 @@ class AnalogSkin:
         return self._began is not None and self.frame_number(at) >= len(self.frames_v)
 
     def frame_number(self, at: int) -> int:
-        """Of the scene's frame at ``at``; may be beyond the last."""
+        """Return the number of the scene's frame at ``at``; it may be beyond the last one."""
         assert self._began is not None
         return int((at - self._began) * self.rate_hz // TICKS_PER_S)
 

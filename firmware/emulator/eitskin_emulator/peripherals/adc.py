@@ -131,7 +131,7 @@ class Adc(Registers):
 
     @property
     def channel(self) -> int:
-        """Of the one conversion."""
+        """The channel of the one conversion."""
         return self.values[SQR3] & 0x1F
 
     def _sampling_ticks(self) -> int:

@@ -44,7 +44,7 @@ class DmaStream:
 
     @property
     def request(self) -> str | None:
-        """What asks it for transfers."""
+        """The peripheral that requests its transfers."""
         return REQUESTS.get((self.dma.number, self.number, self.control >> 25 & 0xF))
 
     @property

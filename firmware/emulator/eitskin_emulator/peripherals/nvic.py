@@ -69,7 +69,7 @@ class Nvic:
         )
 
     def running_urgency(self) -> int:
-        """Of the handlers that have begun; without the masks."""
+        """The most urgent priority of the handlers that have begun, without the masks."""
         return min((self.urgency(number) for number in self.active), default=THREAD_PRIORITY)
 
     def masked_urgency(self) -> int:

@@ -74,29 +74,29 @@ class Rcc(Registers):
 
     @property
     def sysclk_hz(self) -> int:
-        """Of the processor's source."""
+        """The frequency of the processor's clock source."""
         source = self.values[CFGR] & 3
         return (HSI_HZ, self._hse_hz or 0, self._pll_hz(), 0)[source]
 
     @property
     def hclk_hz(self) -> int:
-        """Of the processor and the AHB."""
+        """The frequency of the processor and the AHB."""
         code = self.values[CFGR] >> 4 & 0xF
         return self.sysclk_hz // (1 if code < 8 else (2, 4, 8, 16, 64, 128, 256, 512)[code - 8])
 
     def apb_hz(self, bus: int) -> int:
-        """Of APB1 or APB2."""
+        """Return the frequency of APB1 or APB2."""
         return self.hclk_hz // self._apb_divisor(bus)
 
     def timer_hz(self, bus: int) -> int:
-        """Of the timers on APB1 or APB2 (5.2, "Clocks": twice the bus where it is divided, with
-        TIMPRE up to four times)."""
+        """Return the frequency of the timers on APB1 or APB2 (5.2, "Clocks": twice the bus where it
+        is divided, with TIMPRE up to four times)."""
         divisor, most = self._apb_divisor(bus), 4 if self.values[DCKCFGR1] >> 24 & 1 else 2
         return self.hclk_hz if divisor <= most else self.apb_hz(bus) * most
 
     @property
     def mco1_hz(self) -> int:
-        """Of what PA8 gives in its alternate function 0; 0: nothing."""
+        """The frequency that PA8 gives in its alternate function 0; 0: no clock."""
         source = self.values[CFGR] >> 21 & 3
         code = self.values[CFGR] >> 24 & 7
         hse = (self._hse_hz or 0) if self._ready(CR) >> 17 & 1 else 0

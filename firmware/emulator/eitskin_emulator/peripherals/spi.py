@@ -66,7 +66,7 @@ class Spi(Registers):
 
     @property
     def bits(self) -> int:
-        """Of a frame."""
+        """The bits of a frame."""
         size = self.values[CR2] >> 8 & 0xF
         return 8 if size < 3 else size + 1
 

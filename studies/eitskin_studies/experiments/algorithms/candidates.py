@@ -1,5 +1,5 @@
-"""What is compared: each method with the parameters that it may have, and the one that it has where
-parameters are fixed."""
+"""The candidates that are compared: each method with the parameters that it may have, and the one
+that it has if parameters are fixed."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What is measured: curves of MIoU over the threshold, positions, counts and MACs, in parts that
+"""The measurements: curves of MIoU over the threshold, positions, counts and MACs, in parts that
 are kept as they come."""
 
 from collections.abc import Sequence
@@ -29,8 +29,8 @@ TUNING, TEST = "tuning", "test"
 
 @dataclass(frozen=True)
 class ChosenParameter:
-    """What was chosen on tuning scenes: the parameter's ``value``, t of MIoU for each lookup, and t
-    of positions (None where the method reports touches itself)."""
+    """The choices made on tuning scenes: the parameter's ``value``, t of MIoU for each lookup, and
+    t of positions (None where the method reports touches itself)."""
 
     value: float
     thresholds: dict[str, float]
@@ -62,7 +62,7 @@ class Field:
 
     @cached_property
     def setup(self) -> Setup:
-        """What methods are built from."""
+        """The data that methods are built from."""
         return setup_for(self.skin, self.protocol, elements=MODEL_ELEMENTS)
 
     @cached_property
@@ -79,11 +79,11 @@ class Field:
 
     @cached_property
     def solver(self) -> SceneSolver:
-        """Of scenes, on a mesh of its own."""
+        """The simulator of scenes, on a mesh of its own."""
         return self.workspace.scenes(self.skin, self.protocol)
 
     def seed_and_count(self, role: str) -> tuple[int, int]:
-        """Of the sets of "tuning" and "test"."""
+        """Return seed and size of the set "tuning" or "test"."""
         settings = self.workspace.settings
         return (settings.tuning_seed, self.tuning) if role == TUNING else (settings.seed, self.test)
 

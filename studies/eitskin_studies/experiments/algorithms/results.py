@@ -86,7 +86,7 @@ class AlgorithmResult:
 
 
 def column(curves: FloatArray, t: float) -> FloatArray:
-    """Of MIoU (k, T) at each of ``THRESHOLDS`` those at ``t``, (k,)."""
+    """Return the MIoU at ``t`` (k,) from that at each of ``THRESHOLDS`` (k, T)."""
     return np.asarray(curves[:, THRESHOLDS.index(t)])
 
 

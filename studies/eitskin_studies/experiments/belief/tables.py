@@ -62,8 +62,8 @@ def coverage(frames: Sequence[Mapping[str, Any]]) -> Share:
 
 @dataclass(frozen=True)
 class Counts:
-    """Of a set's frames: counted right; said to be crowded, of those right and of those wrong;
-    counted right or said to be crowded."""
+    """Return the shares of a set's frames: counted right; said to be crowded, of those right and of
+    those wrong; counted right or said to be crowded."""
 
     right: Share
     said_right: Share
@@ -72,7 +72,7 @@ class Counts:
 
 
 def counts(frames: Sequence[Mapping[str, Any]]) -> Counts:
-    """Of one set."""
+    """Return the row of one set."""
     right = np.array([len(one["touches"]) == one["true"] for one in frames], dtype=np.bool_)
     said = np.array([one["crowded"] for one in frames], dtype=np.bool_)
     return Counts(share_of(right), share_of(said[right]), share_of(said[~right]),
@@ -121,7 +121,7 @@ def counts_table(sets: Sets) -> Table:
 
 
 def summary(sets: Sets) -> str:
-    """What holds, in sentences with numbers."""
+    """Return sentences with numbers about what holds."""
     covered = {
         name: one.mean
         for name, frames in sets.items()

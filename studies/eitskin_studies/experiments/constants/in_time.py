@@ -31,8 +31,8 @@ ZONES = (
 
 @dataclass(frozen=True, eq=False)
 class GestureScene:
-    """What the core finds in a session's ``frames`` and makes of it. ``found`` are its touches
-    where the core that finds them is not judged."""
+    """Play a session's ``frames`` through the core. ``found`` gives the touches if the core that
+    finds them is not judged."""
 
     session: DrawnSession
     frames: FrameScene

@@ -1,4 +1,4 @@
-"""What the core makes of a judging scene: a digest of every bit, and the numbers by which it is
+"""The core's results for a judging scene: a digest of every bit, and the numbers by which it is
 judged."""
 
 import hashlib
@@ -61,14 +61,14 @@ class Score:
 
 @dataclass(frozen=True)
 class Played:
-    """What came of a scene: all that must be the same where the bits are, and its score."""
+    """The result of a scene: everything that must be equal if the bits are, and its score."""
 
     bits: Sequence[str]
     score: Callable[[], Score]
 
     @property
     def digest(self) -> str:
-        """Of the bits."""
+        """The digest of the bits."""
         return hashlib.sha256("\n".join(self.bits).encode()).hexdigest()[:16]
 
 
@@ -143,8 +143,8 @@ class FrameScene:
 
 
 def solved(engine: CoreEngine, scene: FrameScene) -> list[Solved]:
-    """What the core makes of the frames; a frame that it rejects gives its error, and a tare that
-    it rejects is the error of every frame."""
+    """Return the core's results for the frames; a frame that it rejects gives its error, and a tare
+    that it rejects is the error of every frame."""
     _set_options(engine, scene)
     rows = np.zeros(engine.n_rows, dtype=np.bool_) if scene.masked is None else scene.masked
     engine.mask_rows(rows)

@@ -113,7 +113,7 @@ class Tests:
 
 
 def protecting(tests: Tests, constants: Sequence[Constant]) -> dict[str, list[str]]:
-    """Of each constant the tests that fail with its half or its double."""
+    """Return for each constant the tests that fail with its half or its double."""
     return {
         one.name: sorted({name for value in one.changed() for name in tests.failing(one, value)})
         for one in constants

@@ -67,7 +67,7 @@ class SceneMaker:
 
     @property
     def seed(self) -> int:
-        """Of all that is drawn."""
+        """The first seed of everything that is drawn."""
         return FIRST_SEED + self.workspace.settings.seed
 
     def scenes(self) -> list[FrameScene]:

@@ -22,7 +22,8 @@ LONGEST_S = 120.0
 
 @dataclass(frozen=True)
 class Baseline:
-    """Of one scene at the values of the table: its digest, its score, the constants it uses."""
+    """The result of one scene at the values of the table: its digest, its score, the constants it
+    uses."""
 
     digest: str
     score: Score
@@ -31,7 +32,7 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Effect:
-    """What one value of one constant does.
+    """The effect of one value of one constant.
 
     Attributes:
         value: in the place of the table's.
@@ -80,7 +81,7 @@ def baselines(variant: Variant, scenes: Sequence[Scene]) -> list[Baseline]:
 def effects_of(
     constant: Constant, variant: Variant, scenes: Sequence[Scene], known: Sequence[Baseline]
 ) -> list[Effect]:
-    """Of the half and the double."""
+    """Return the effects of the half and of the double."""
     judging = [k for k, one in enumerate(scenes) if one.module in (None, constant.module)]
     if constant.module == "fast":
         judging = [k for k in judging if scenes[k].module == "fast"]
@@ -155,7 +156,7 @@ def _play(
 
 
 def numbers_of(score: Score) -> dict[str, float]:
-    """What is compared: counts, and means or quantiles where they are sums."""
+    """Return the numbers that are compared: counts, and means or quantiles where they are sums."""
     errors, touched = score.errors_mm or [0.0], max(1, score.touched)
     return {
         "frames": score.frames,

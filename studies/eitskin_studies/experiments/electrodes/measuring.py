@@ -72,7 +72,7 @@ def usual_case(electrodes: int, pattern: str, equal: str) -> PatternCase:
 
 @cache
 def scan_of(case: PatternCase) -> ScanPattern:
-    """What is scanned: everything with the usual samples, or what fits into the usual frame."""
+    """Return the scan: everything with the usual samples, or what fits into the usual frame."""
     protocol = PATTERNS[case.pattern](case.electrodes)
     return (
         ScanPattern(protocol, BASE_SAMPLES)
@@ -102,8 +102,8 @@ class PatternWorkspace:
 
     @cached_property
     def sets(self) -> dict[str, TouchSet]:
-        """What is touched: for choosing settings and to report, 1 to 3 random ones, six apart, and
-        pairs at each distance."""
+        """Return the touches: for choosing settings and to report, 1 to 3 random ones, six apart,
+        and pairs at each distance."""
         settings, outline = self.workspace.settings, self.skin.outline
         sets = {
             "train": random_touches(outline, settings.tuning_seed, settings.count(TUNING), "train"),

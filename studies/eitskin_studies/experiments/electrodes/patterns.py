@@ -73,15 +73,15 @@ def samples_within(rows: int, frame_us: float = FRAME_US) -> int:
 
 
 def scan_ms(rows: int, samples: int) -> float:
-    """What a scan of ``rows`` takes with ``samples`` a measurement."""
+    """Return the time of a scan of ``rows`` with ``samples`` per measurement."""
     slot_us = -(-(samples + SETTLE_US + SWITCH_US) // PERIOD_US) * PERIOD_US
     return rows * slot_us / 1000
 
 
 @dataclass(frozen=True, eq=False)
 class ScanPattern:
-    """What is measured and how long: ``protocol``, ``samples`` of each row, every how many drives
-    are left."""
+    """The measurements and their length: ``protocol``, ``samples`` of each row, every how many
+    drives are left."""
 
     protocol: Protocol
     samples: int

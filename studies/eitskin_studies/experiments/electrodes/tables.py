@@ -1,4 +1,4 @@
-"""What was measured of electrodes and patterns, as tables."""
+"""Tables of the measurements of electrodes and patterns."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -29,7 +29,7 @@ REGULARISATIONS, LAMBDAS, ITERATIONS = (
 
 @dataclass(frozen=True)
 class ChosenSettings:
-    """What was chosen: mu of the whitening, least lambda over lambda_max, iterations, t of the
+    """The chosen settings: mu of the whitening, least lambda over lambda_max, iterations, t of the
     mask."""
 
     regularisation: float

@@ -110,7 +110,7 @@ def play(row: Row, count: int, seed: int, number: int, elements: int) -> list[Ou
 
 
 def _scanned(protocol: Protocol, half: bool) -> tuple[Protocol, IntArray]:
-    """What is scanned of a protocol, in its order, and which of its rows these are."""
+    """Return the part of a protocol that is scanned, in its order, and the numbers of its rows."""
     if not half:
         return in_order(protocol, f"by {STEP}"), np.arange(protocol.n_rows)
     drive = np.repeat(

@@ -52,7 +52,7 @@ class TrueInTime:
 
 @dataclass(eq=False)
 class Outcome:
-    """What was reported of one scene: false touches, of each finger the delay of its first report
+    """The reports of one scene: false touches, of each finger the delay of its first report
     and the error then (or None), errors by finger, frames counted, and how many were reported after
     each drive; when a diagnostic was first reported."""
 
@@ -88,11 +88,11 @@ class Player:
         return self.fast.aligned(frame)
 
     def named(self, found: Info) -> Info:
-        """What is reported of the solver's diagnostics."""
+        """Return the solver's diagnostics that are reported."""
         return self.fast.named(found)
 
     def confirm(self, found: Reconstruction) -> list[FastTouch]:
-        """What the solver made of it goes back."""
+        """Give the solver's touches back to the tracks, and return the touches."""
         return self.fast.confirm(found.touches)
 
     def play(self, scan: Scan, volts: FloatArray, truth: Sequence[TrueInTime]) -> Outcome:

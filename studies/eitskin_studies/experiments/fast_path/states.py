@@ -29,7 +29,7 @@ _MESHES = MeshCache()
 
 @dataclass(frozen=True)
 class Touched:
-    """What touches do to the sheet."""
+    """The changes of the sheet by touches."""
 
     radius_mm: float = 8.0
     contrast: float = 5.0

@@ -1,5 +1,5 @@
-"""What a weight does to the sheet, and how sure that is: a disc's radius by Hertz, its contrast by
-the piezoresistive law.
+"""The effect of a weight on the sheet, and how sure it is: a disc's radius by Hertz, its contrast
+by the piezoresistive law.
 
 - Contact radius: a rigid round tip of radius rho on an elastic half-space of reduced modulus E*
   under load F has a = (3 F rho / (4 E*))^(1/3) (Hertz 1882; Johnson, Contact Mechanics, 1985,
@@ -38,7 +38,7 @@ class PressLaw:
     saturation: float = 9.0
 
     def radius_mm(self, grams: float) -> float:
-        """Of the contact."""
+        """The radius of the contact in mm."""
         newtons = grams * NEWTONS_PER_GRAM
         return float(1e3 * (0.75 * newtons * self.tip_mm * 1e-3 / self.modulus_pa) ** (1 / 3))
 

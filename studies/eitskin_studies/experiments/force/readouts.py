@@ -1,4 +1,4 @@
-"""What is read off a frame as the strength of its press: an image's peak or integral, or the
+"""Readings of a frame as the strength of its press: an image's peak or integral, or the
 touch's strength off the grid."""
 
 from collections.abc import Mapping
@@ -30,8 +30,8 @@ READOUTS = (PEAK, INTEGRAL, IMAGE_PEAK, IMAGE_INTEGRAL, TOUCH, LOG_INTEGRAL, LOG
 
 @dataclass(frozen=True, eq=False)
 class Readout:
-    """Of k frames: ``value`` (k,), NaN where nothing was found; ``place_mm`` (k, 2) where; ``macs``
-    a frame, 0: not counted."""
+    """The readings of k frames: ``value`` (k,), NaN where nothing was found; ``place_mm`` (k, 2)
+    where; ``macs`` a frame, 0: not counted."""
 
     value: FloatArray
     place_mm: FloatArray
@@ -61,7 +61,7 @@ class Instruments:
 
     @property
     def radius_mm(self) -> float:
-        """Of the image: what ``eitskin calibrate`` measures places by."""
+        """The size of the image, by which ``eitskin calibrate`` measures places."""
         return float(np.hypot(*self.linear.grid.centres_mm().T).max())
 
     def batch(self, kind: str, untouched_v: FloatArray) -> Batch:

@@ -42,7 +42,7 @@ class PressSet:
 
     @property
     def facts(self) -> list[str]:
-        """What tells it from any other set: its name, and its discs."""
+        """Return what tells this set from any other: its name and its discs."""
         discs = [
             list(vars(touch).values())
             for scene in self.session.touches.scenes

@@ -154,7 +154,7 @@ def _by_place(curve: scenes.PressSet, read: Readout) -> list[list[float]]:
 
 
 def pressures() -> str:
-    """Of the two contacts, in words."""
+    """Describe the two contacts in words."""
 
     def of(law: Any) -> str:
         first, last = (law.pressure_kpa(grams) for grams in (WEIGHTS_G[0], WEIGHTS_G[-1]))

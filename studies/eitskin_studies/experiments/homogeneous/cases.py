@@ -58,7 +58,7 @@ class TankCase:
         }
 
     def scan(self, electrode: int) -> Protocol:
-        """What is scanned in truth, believed to be the adjacent scan."""
+        """Return the protocol that is really scanned while the adjacent one is assumed."""
         scan = adjacent(ELECTRODES)
         if not self.swap:
             return scan
@@ -131,8 +131,8 @@ def examined(
 
 
 def doctored(frames: Frames, skin: Skin) -> dict[str, Any]:
-    """What ``eitskin doctor`` finds in ``frames``: "findings" [name, severity, text], "measured"
-    and "untold"."""
+    """Return what ``eitskin doctor`` finds in ``frames``: "findings" [name, severity, text],
+    "measured" and "untold"."""
     report = examine(subject_from_frames(frames, skin)).as_table()
     findings = [[one["name"], one["severity"], one["text"]] for one in report["findings"]]
     return {"findings": findings, "measured": report["measured"], "untold": report["untold"]}

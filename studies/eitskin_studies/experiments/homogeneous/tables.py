@@ -45,7 +45,7 @@ class Row:
     fault: bool = False
 
     def values(self, measure: str) -> list[float]:
-        """Of each session, percent."""
+        """Return the values of each session, in percent."""
         return [float(getattr(one, measure)) for one in self.uniformities]
 
     def said(self) -> str:

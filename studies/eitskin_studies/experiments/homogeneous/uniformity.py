@@ -49,7 +49,7 @@ def fold_for(protocol: Protocol) -> Fold:
 
 @dataclass(frozen=True)
 class Uniformity:
-    """Of one frame, in percent.
+    """The uniformity of one frame, in percent.
 
     Attributes:
         spread: standard deviation over drives / mean over drives, the mean of all positions;
@@ -68,7 +68,7 @@ class Uniformity:
 
 
 def uniformity(voltage_v: FloatArray, protocol: Protocol, fold: Fold) -> Uniformity:
-    """Of a frame (m,) V."""
+    """Return the uniformity of a frame (m,) V."""
     folded, pairs = fold.of(voltage_v), protocol.reciprocal_pairs()
     level = _rms(folded)
     spread = folded.std(axis=0) / np.abs(folded.mean(axis=0))

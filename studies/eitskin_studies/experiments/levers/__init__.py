@@ -1,5 +1,5 @@
-"""What was tried to do better than discs fitted to an image's peaks, each ablation for itself, with
-what it costs."""
+"""Ablations: attempts to do better than discs fitted to an image's peaks, each one for itself and
+with its cost."""
 
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.levers.configurations import IMAGES, SEARCHES

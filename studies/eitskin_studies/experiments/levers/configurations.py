@@ -1,4 +1,5 @@
-"""What is compared: ways of searching for touches, and ways of making the image."""
+"""The configurations that are compared: ways of searching for touches, and ways of making the
+image."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -104,7 +104,7 @@ class AblationRuns:
         return spaced_touches(outline, seed, how.count(usual), touches, spacing)
 
     def model(self, ablation: Ablation) -> Model:
-        """Of a ablation; those of equal settings are one."""
+        """Return the model of an ablation; ablations of equal settings share one."""
         key = repr(ablation.settings)
         if key not in self._models:
             linear = linearise(

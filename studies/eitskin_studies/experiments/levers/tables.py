@@ -74,7 +74,7 @@ def image_table(images: Found) -> Table:
 
 
 def asked_table(images: Found) -> Table:
-    """What is asked of the image, and the cheapest that does it."""
+    """Return a table of the goals for the image, each with the cheapest setting that reaches it."""
     rows = []
     for snr, goals in (("60", (0.86, 0.90)), ("40", (0.78, 0.82))):
         for goal, what in zip(goals, ("at least", "aim"), strict=True):

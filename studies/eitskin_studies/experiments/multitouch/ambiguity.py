@@ -117,7 +117,7 @@ class Rule:
         )
 
     def chances(self, frames: Sequence[ScoredFrame]) -> FloatArray:
-        """Of being exact, (k,)."""
+        """Return the chance that each frame's count is exact, (k,)."""
         return np.asarray(1 / (1 + np.exp(-self.scores(frames))))
 
 
@@ -161,7 +161,7 @@ def _bar(scores: FloatArray, exact: BoolArray, aim: float) -> float:
 
 @dataclass(frozen=True)
 class ConfidenceCalibration:
-    """What saying doubt is worth.
+    """The worth of flagging doubtful frames.
 
     Attributes:
         not_said: frames about which nothing was said.
@@ -181,7 +181,7 @@ class ConfidenceCalibration:
 def calibration(
     frames: Sequence[ScoredFrame], said: BoolArray | None = None
 ) -> ConfidenceCalibration:
-    """Of the core's own ``crowded``, or of ``said`` (k,)."""
+    """Return the worth of the core's own ``crowded``, or of ``said`` (k,)."""
     says = np.array([one.said for one in frames], dtype=np.bool_) if said is None else said
     right, exact = (
         np.array([getattr(one, name) for one in frames], dtype=np.bool_)
@@ -196,9 +196,9 @@ def calibration(
 
 @dataclass(frozen=True)
 class Reliability:
-    """Of chances: mean chance and what came true in each bin (nan of an empty one), Brier's score
-    (1950), and the expected calibration error: the mean over frames of their bin's |chance -
-    truth|."""
+    """The calibration of chances: mean chance and what came true in each bin (nan of an empty one),
+    Brier's score (1950), and the expected calibration error: the mean over frames of their bin's
+    |chance - truth|."""
 
     chance: tuple[float, ...]
     truth: tuple[Share, ...]

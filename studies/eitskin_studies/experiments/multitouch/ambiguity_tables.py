@@ -78,7 +78,8 @@ def found_some(frames: Sequence[ScoredFrame]) -> list[ScoredFrame]:
 
 
 def reliabilities(ambiguities: Ambiguities, name: str) -> dict[str, Reliability]:
-    """Of the score's chances on test frames, by SNR in dB as text, and "all"."""
+    """Return the calibration of the score's chances on test frames, by SNR in dB as text, and
+    "all"."""
     result = {}
     for snr_db in (*SNRS_DB, None):
         mine = [one for one in found_some(ambiguities.mixed[name]) if snr_db in (None, one.snr_db)]

@@ -1,4 +1,4 @@
-"""What is touched: rings as the paper's, random places, uneven touches, and mixed scenes for
+"""The touches: rings as the paper's, random places, uneven touches, and mixed scenes for
 judging the doubt."""
 
 import math
@@ -44,7 +44,7 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """Of the set and its file."""
+        """The name of the set and of its file."""
         return f"{self.geometry} {self.touches}"
 
 

@@ -38,7 +38,7 @@ def share(hits: int, count: int) -> Share:
 
 
 def share_of(truth: Sequence[bool] | BoolArray) -> Share:
-    """Of truth values."""
+    """Return the share of truth values that are true."""
     values = np.asarray(truth, dtype=np.bool_)
     return share(int(values.sum()), len(values))
 
@@ -64,7 +64,7 @@ def quantile(values: Sequence[float], at: float, seed: int = 0) -> Quantile:
 
 @dataclass(frozen=True)
 class Score:
-    """Of one method on one cell at one SNR.
+    """The counts of one method on one cell at one SNR.
 
     Attributes:
         exact: scenes with every touch within 10 mm, and nothing else.
@@ -89,7 +89,7 @@ class Score:
 def score(
     truths_mm: Sequence[FloatArray], found_mm: Sequence[FloatArray], macs: Sequence[int] = ()
 ) -> Score:
-    """Of scenes' true and found places."""
+    """Return the counts of scenes from their true and found places."""
     matchings = match_all(truths_mm, found_mm)
     errors = [d for m in matchings for d in m.distances_mm]
     hits = sum(m.hits for m in matchings)

@@ -114,7 +114,7 @@ def count_all(touch_data: TouchData, workspace: Workspace) -> CountedScenes:
 
 
 def limits(touch_data: TouchData, workspace: Workspace) -> list[Limit]:
-    """Of ``CEILING_CELLS``, each kept."""
+    """Return the results of ``CEILING_CELLS``; each one is kept."""
     found = []
     usual = {(cell.geometry, cell.touches): cell for cell in counting_cells()}
     for geometry, touches, snr_db in workspace.progress(CEILING_CELLS, "fitting from the truth"):

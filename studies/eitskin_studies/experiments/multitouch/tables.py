@@ -1,4 +1,4 @@
-"""What was measured as tables: shares in %, with their 95 % intervals."""
+"""Tables of the measurements: shares in %, with their 95 % intervals."""
 
 import math
 from collections.abc import Sequence
@@ -203,7 +203,7 @@ def single_table(counted: CountedScenes) -> Table:
 
 
 def limit_table(limits: Sequence[Limit]) -> Table:
-    """What limits the count."""
+    """Return a table of the limits of the count."""
     rows = []
     for one in limits:
         ours = (f"{d[name]}/{one.scenes}" for name in NAMES for d in (one.core, one.told))

@@ -63,12 +63,12 @@ class TouchData:
         return self._models[variant.name]
 
     def seed_radius_mm(self, variant: TouchVariant) -> float:
-        """Of a touch that nothing is known of."""
+        """Return the radius of a touch about which nothing is known."""
         usual = scaled_defaults(self.skin, variant.settings.data_kind).touch_seed_radius_mm
         return float(variant.options.get("touch_seed_radius_mm", usual))
 
     def scenes(self, cell: Cell, tuning: bool = False) -> TouchSet:
-        """What is touched; raises GeometryError where it does not fit."""
+        """Return the touches; raises GeometryError if they do not fit."""
         if (cell.name, tuning) not in self._drawn:
             settings = self.workspace.settings
             seed = settings.tuning_seed if tuning else settings.seed
@@ -91,13 +91,13 @@ class TouchData:
         return [scene.centres_mm() for scene in self.scenes(cell, tuning).scenes]
 
     def facts(self, what: str, cell: Cell, snr_db: float, tuning: bool) -> dict[str, object]:
-        """What a part is of."""
+        """Return the facts by which a part is kept."""
         return {"part": what, "set": self.scenes(cell, tuning).name, "snr_db": snr_db}
 
     def seen(
         self, cell: Cell, variant: TouchVariant, snr_db: float, tuning: bool = False
     ) -> list[SeenFrame]:
-        """What the core says of each scene."""
+        """Return the core's result for each scene."""
 
         def make() -> list[dict[str, object]]:
             return [

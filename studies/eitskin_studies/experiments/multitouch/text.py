@@ -25,7 +25,7 @@ GOOD = 0.90
 
 
 def conditions(touch_data: TouchData, workspace: Workspace) -> str:
-    """What all tables share."""
+    """Return the conditions that all tables share."""
     settings = workspace.settings
     chosen = ((name, touch_data.trained(name)) for name in CLASSICAL)
     trained = "; ".join(
@@ -54,7 +54,7 @@ def closing(counted: CountedScenes, limited: Sequence[Limit]) -> str:
 
 
 def doubtful(ambiguous: Ambiguities) -> str:
-    """What ``crowded`` says of the core's counts, by SNR."""
+    """Return how right ``crowded`` is about the core's counts, by SNR."""
     told = []
     for snr_db in (HEADLINE_DB, 40.0):
         one = calibration([f for f in ambiguous.mixed[NAMES[0]] if f.snr_db == snr_db])

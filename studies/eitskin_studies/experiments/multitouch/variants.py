@@ -49,7 +49,7 @@ VARIANTS = (
 
 @dataclass(frozen=True)
 class SeenFrame:
-    """What the core says of a frame: a list's place k is found touch k. ``clear``: max(S'y) over
+    """The core's result for a frame: a list's place k is found touch k. ``clear``: max(S'y) over
     that of noise."""
 
     x_mm: list[float]
@@ -107,8 +107,8 @@ def solve(model: Model, variant: TouchVariant, measured: MeasuredFrames) -> list
 
 @dataclass(frozen=True)
 class TrainedMethod:
-    """What tuning scenes chose for a classical method: its parameter, and t' of the rule that reads
-    touches off its image."""
+    """The settings that tuning scenes chose for a classical method: its parameter, and t' of the
+    rule that reads touches off its image."""
 
     value: float
     threshold: float

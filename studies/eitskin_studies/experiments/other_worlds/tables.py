@@ -85,7 +85,7 @@ def headline_table(scores: Scores) -> Table:
 
 
 def summary(scores: Scores) -> str:
-    """What fails, in a sentence with numbers."""
+    """Return a sentence with numbers about the sets that fail."""
     failing = sorted(_failing(scores), key=_exact)
     half = [one for one in failing if _exact(one) < 0.5]
     warned = [one["warned"] for one in failing if one["warned"] is not None]

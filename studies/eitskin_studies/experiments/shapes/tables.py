@@ -1,4 +1,4 @@
-"""What was measured of the shapes, as tables."""
+"""Tables of the measurements of the shapes."""
 
 import math
 from collections.abc import Mapping
@@ -107,8 +107,8 @@ def _lost_rows(variant: ShapeVariant, result: Mapping[str, Any]) -> list[tuple[s
 
 
 def _noticed(variant: ShapeVariant, scores: Mapping[str, Any]) -> list[bool]:
-    """Of each true touch whether anything was found on the same finger, however far along it, or
-    within twice the gate."""
+    """Return for each true touch whether anything was found on the same finger, however far along
+    it, or within twice the gate."""
     gate_mm = 2 * GATE_MM * variant.scale
     noticed = []
     for scene, place in zip(scores["scene"], scores["place_mm"], strict=True):

@@ -97,7 +97,7 @@ def _tank() -> SimulatedTank:
 def _grounds(
     workspace: Workspace, ours: SimulatedTank, folder: Path
 ) -> tuple[EvaluationSets, dict[str, Any]]:
-    """What is judged on, and what all results depend on."""
+    """Return the data to judge on, and the facts on which all results depend."""
     measured = phantoms(folder)
     scale = size_to_paper(ours.skin.outline)
     image_scorer = metrics.judge_for(ours.skin.outline, ours.grid, metrics.RASTER_MM * scale)

@@ -1,4 +1,4 @@
-"""What touches as discs depend on besides the data: the radius's prior, the model's electrodes, the
+"""Touches as discs depend on more than the data: the radius's prior, the model's electrodes, the
 signs looked for."""
 
 from collections.abc import Iterable

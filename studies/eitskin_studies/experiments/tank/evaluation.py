@@ -31,8 +31,8 @@ PLACE_THRESHOLDS = THRESHOLDS[4::5]
 
 @dataclass(frozen=True, eq=False)
 class EvaluationSets:
-    """What entries are judged on: sets to choose by (``metal``, ``mixed``), a set to report
-    (``test``), the measured frames; ``noise_share`` is the simulated noise over the rms of a
+    """The data on which entries are judged: sets to choose by (``metal``, ``mixed``), a set to
+    report (``test``), the measured frames; ``noise_share`` is the simulated noise over the rms of a
     frame's change."""
 
     image_scorer: metrics.ImageScorer
@@ -142,8 +142,8 @@ def _discs(touches: Sequence[Touch], sign: int, image_scorer: metrics.ImageScore
 
 
 def best_place_threshold(images: FloatArray, evaluation_sets: EvaluationSets) -> float:
-    """Of the metal set's ``images``: the threshold with most scenes counted exactly, then most hits
-    less false ones."""
+    """Return the best threshold for the metal set's ``images``: the one with most scenes counted
+    exactly, then most hits less false ones."""
     best, best_score = PLACE_THRESHOLDS[0], (-1, 0)
     index, centres = evaluation_sets.grid.index, evaluation_sets.grid.centres_mm()
     for threshold in PLACE_THRESHOLDS:

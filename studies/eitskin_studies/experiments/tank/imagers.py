@@ -1,5 +1,5 @@
-"""What makes images of the tank's frames: every baseline on every kind of data, and the core with
-its levers."""
+"""Methods that make images of the tank's frames: every baseline on every kind of data, and the core
+with its levers."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -61,7 +61,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Levers:
-    """What was tried for images of large objects.
+    """The settings that were tried for images of large objects.
 
     Attributes:
         kind: of the data.
@@ -90,7 +90,7 @@ class SimulatedTank:
 
     @property
     def grid(self) -> Grid:
-        """Of all images."""
+        """The grid of all images."""
         return self.linear.grid
 
     def kernel(self, radius_pixels: float) -> FloatArray:

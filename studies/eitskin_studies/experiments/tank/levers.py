@@ -1,4 +1,4 @@
-"""What makes images of large objects better, each lever for itself and all together, chosen on
+"""Levers that improve images of large objects, each for itself and all together, chosen on
 simulated tank scenes only."""
 
 from collections.abc import Iterable
@@ -73,7 +73,7 @@ def entry_of(tank: SimulatedTank, name: str, levers: Levers) -> Entry:
 
 
 def words_of(levers: Levers) -> str:
-    """What differs from the defaults."""
+    """Return the differences from the defaults."""
     start, words = Levers(kind=levers.kind), []
     words += (
         [f"mu {levers.regularisation:g}"] if levers.regularisation != start.regularisation else []

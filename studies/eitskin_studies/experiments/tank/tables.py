@@ -1,4 +1,4 @@
-"""What the tank study found, as tables, pictures and sentences."""
+"""The results of the tank study as tables, pictures and sentences."""
 
 from pathlib import Path
 from typing import Any
@@ -93,8 +93,8 @@ def ranked(results: list[Found], score: str) -> list[Found]:
 
 
 def columns(results: list[Found]) -> list[Found]:
-    """What a gallery has room for: without short runs of plain FISTA, and discs of the defaults on
-    ratios only."""
+    """Return the entries for which a gallery has room: without short runs of plain FISTA, and discs
+    of the defaults on ratios only."""
     return [
         one
         for one in results
@@ -213,7 +213,7 @@ def levers_table(levers: dict[Levers, Found], best: Levers) -> Table:
 
 
 def discs_table(discs: list[Found]) -> Table:
-    """What touches as discs depend on."""
+    """Return a table of what touches as discs depend on."""
     rows = [
         (
             one["name"],
@@ -235,7 +235,7 @@ def discs_table(discs: list[Found]) -> Table:
 
 
 def ceiling_table(ceiling: list[Found]) -> Table:
-    """What an image without error would have."""
+    """Return a table of what an image without error would have."""
     rows = [
         (
             f"{one['off']:.2f} of the radius",
@@ -260,7 +260,7 @@ def conditions(evaluation_sets: EvaluationSets, settings: ExperimentSettings) ->
 
 
 def chosen_words(levers: dict[Levers, Found], best: Levers) -> str:
-    """What simulation chose, and the spread of what it cannot tell apart."""
+    """Return the lever that simulation chose, and the spread of those that it cannot tell apart."""
     top = levers[best]["tuned"]
     near = [one for one in levers.values() if one["tuned"] >= top - 0.01]
     means = sorted(float(np.mean(one["touch_like"])) for one in near)

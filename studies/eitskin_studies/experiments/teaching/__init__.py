@@ -205,7 +205,7 @@ def _updated(presses: Presses, change: Change, seed: int) -> dict[str, Any]:
 
 @cache
 def first_model(presses: Presses) -> Model:
-    """Of the first presses."""
+    """Return the model that the first presses teach."""
     return teach(presses.take(np.arange(TAUGHT)), SKIN).model
 
 
@@ -214,7 +214,7 @@ def _middle(taught: Taught, judged: Presses) -> float:
 
 
 def _drift_known(presses: Presses, seed: int) -> Model:
-    """Of the same presses, in order of time, with drift as noise."""
+    """Return the model of the same presses in the order of time, with drift as noise."""
     order = np.random.default_rng(seed).permutation(len(presses))
     known = presses.take(np.sort(order[:100]))
     return teach(known, SKIN, reference_age=AGE_TAUGHT).model

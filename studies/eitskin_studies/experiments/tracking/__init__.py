@@ -1,4 +1,4 @@
-"""What following touches in time is worth: starts confirmed, ids held, places smoothed; on streams
+"""The worth of tracking touches in time: starts confirmed, ids held, places smoothed; on streams
 of moving fingers."""
 
 from collections.abc import Mapping, Sequence

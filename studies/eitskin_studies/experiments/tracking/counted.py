@@ -1,4 +1,4 @@
-"""What a stream's touches are worth against the truth: counts, places, ids, and how late starts and
+"""A stream's touches against the truth: counts, places, ids, and how late starts and
 ends are reported."""
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from eitskin_studies.experiments.tracking.streams import TouchStream
 
 @dataclass
 class TrackCount:
-    """Of one stream or of several added up.
+    """The counts of one stream, or of several added up.
 
     Attributes:
         frames, exact: frames, and those with every true touch within 10 mm and nothing else.

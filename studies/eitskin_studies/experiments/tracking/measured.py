@@ -136,5 +136,5 @@ class Measurer:
 def counts(
     measurer: Measurer, streams: Sequence[TouchStream], snr_db: float, way: Way, what: str
 ) -> list[TrackCount]:
-    """Of each stream."""
+    """Return the counts of each stream."""
     return [measurer.count(one, snr_db, way) for one in measurer.workspace.progress(streams, what)]
