@@ -1,6 +1,6 @@
 """The functions that ``import eitskin`` gives: they stream a skin's frames and load models."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from eitskin.session.session import Session
 from eitskin.session.settings import SessionSettings, kinds_of
 from eitskin.session.zones import load_zones
 from eitskin.sinks.outputs import attached_outputs
+from eitskin.threads import OneThreadAtATime
 from eitskin.truth import observe_scene
 from eitskin.tuning.for_model import operating_point_for
 from eitskin.tuning.front import Preset, named_preset
@@ -81,6 +82,26 @@ def stream(
         EitskinError: the board cannot be opened or set up, its stream fails, or a sink cannot be
             opened.
     """
+    frames_of = _stream(
+        url, mode, model, frames, every, tare, preset, to, record, zones, speed, solver
+    )
+    return OneThreadAtATime(frames_of, f"the stream of {url}", "a board has one reader at a time")
+
+
+def _stream(
+    url: str,
+    mode: str,
+    model: str | Path | None,
+    frames: int,
+    every: int,
+    tare: int | None,
+    preset: str | None,
+    to: Sequence[str],
+    record: str | Path | None,
+    zones: str | Path | None,
+    speed: float,
+    solver: dict[str, Any],
+) -> Generator[Frame, None, None]:
     settings = SessionSettings(
         mode=kinds_of(mode, "mode"),
         every=every,

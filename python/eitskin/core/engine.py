@@ -3,9 +3,10 @@ host."""
 
 import importlib
 import struct
+import threading
 from dataclasses import asdict, fields
 from time import perf_counter_ns
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,7 @@ from eitskin.core.results import (
     known_touch,
 )
 from eitskin.errors import EitskinError, FrameError, ModelError, UsageError
+from eitskin.threads import one_at_a_time, refuse_copy
 
 WIDTHS = {"float32": "_core_f32", "float64": "_core_f64"}
 
@@ -53,6 +55,9 @@ class CoreEngine:
     """One context of the C core. ``prepared`` keeps a second copy of S in panels (faster, same
     bits); ``portable`` disables processor-specific kernels (slower, same bits).
 
+    C allows one thread at a time in a context, so each method holds ``lock``. Whoever needs several
+    calls in a row without another thread between them holds it, too.
+
     Raises:
     ModelError: the core rejects the model.
     UsageError: the core is not built.
@@ -62,6 +67,7 @@ class CoreEngine:
         self, blob: bytes, width: str = "float32", *, prepared: bool = True, portable: bool = False
     ) -> None:
         module = load_core(width)
+        self.lock = threading.RLock()
         self._lib, self._ffi = module.lib, module.ffi
         self.dtype = np.dtype(np.float32 if width == "float32" else np.float64)
         self._blob = aligned(len(blob))
@@ -101,8 +107,14 @@ class CoreEngine:
     @property
     def handles(self) -> tuple[Any, Any, Any, Any]:
         """The C functions, cffi's object for them, the eits_model and the eits_context, for other
-        code that works on this context."""
+        code that works on this context; it holds ``lock`` meanwhile."""
         return self._lib, self._ffi, self._model, self._context
+
+    def __reduce__(self) -> NoReturn:
+        refuse_copy(
+            "a context of the C core",
+            "pickle the Reconstructor, or make a context of the model's bytes",
+        )
 
     def _view(self, pointer: Any, count: int) -> AnyArray:
         """Return an array over ``count`` reals in the context's memory, without a copy."""
@@ -118,6 +130,7 @@ class CoreEngine:
         text = self._ffi.string(self._lib.eits_status_text(status)).decode()
         return f"{text} (C core, status {int(status)})"
 
+    @one_at_a_time
     def set_options(self, options: Options) -> None:
         """Set all options of the core.
 
@@ -135,6 +148,7 @@ class CoreEngine:
         self._check(self._lib.eits_set_options(self._context, given), "options", UsageError)
         self._saturation_v = float(options.saturation_v)
 
+    @one_at_a_time
     def set_reference(self, frames: FloatArray) -> LearnedReference:
         """Take the reference from untouched ``frames`` (k, m) in V. Four frames or more also give
         the noise; fewer are averaged.
@@ -172,6 +186,7 @@ class CoreEngine:
             int(b.outliers),
         )
 
+    @one_at_a_time
     def mask_rows(self, rows: BoolArray) -> None:
         """Leave the rows of the protocol where ``rows`` (m,) is true out of every frame."""
         self._masked = rows.copy()
@@ -180,6 +195,7 @@ class CoreEngine:
                 self._lib.eits_mask_row(self._context, row, int(rows[row])), "mask", UsageError
             )
 
+    @one_at_a_time
     def forget(self) -> None:
         """Forget the coefficients for the warm start and the tracked touches."""
         self._lib.eits_forget(self._context)
@@ -188,6 +204,7 @@ class CoreEngine:
         if status != 0:
             self._check(status, what, FrameError)
 
+    @one_at_a_time
     def solve_frame(self, frame: npt.NDArray[np.floating[Any]]) -> int:
         """Run only the frame stage and the solver, leave the results in the core, and return the
         status. Benchmarks use it."""
@@ -198,15 +215,18 @@ class CoreEngine:
             )
         )
 
+    @one_at_a_time
     def coefficients(self) -> AnyArray:
         """Return x of the last solve, (n,)."""
         return self._view(self._lib.eits_get_coefficients(self._context), self.n_pixels).copy()
 
+    @one_at_a_time
     def reduced_data(self) -> AnyArray:
         """Return y of the last frame as the solver used it, after projection, (stride,)."""
         stride = (int(self._model.rank) + 7) // 8 * 8
         return self._view(self._lib.eits_get_reduced_data(self._context), stride).copy()
 
+    @one_at_a_time
     def reconstruct(
         self, frame: npt.NDArray[np.floating[Any]], *, touches: bool = True
     ) -> Reconstruction:
@@ -237,6 +257,7 @@ class CoreEngine:
         info = _info(self._info, solved_ns - began_ns, found_ns - solved_ns)
         return Reconstruction(self._image.copy(), coefficients, found, info)
 
+    @one_at_a_time
     def follow(self, frames: npt.NDArray[np.floating[Any]]) -> None:
         """Bring the frame stage to the state after ``frames`` (k, m) in V, so that the next frame
         costs as much as it does there. Only the last usable frame counts: the directions to ignore
@@ -250,6 +271,7 @@ class CoreEngine:
             if status in (self._lib.EITS_OK, self._lib.EITS_E_NOT_FINITE):
                 return
 
+    @one_at_a_time
     def reconstruct_block(
         self, frames: npt.NDArray[np.floating[Any]], *, touches: bool = True
     ) -> list[Reconstruction | FrameError]:
@@ -293,10 +315,12 @@ class CoreEngine:
     def _reals(self, array: AnyArray) -> Any:
         return self._ffi.from_buffer("eits_real[]", array)
 
+    @one_at_a_time
     def last_info(self) -> Info:
         """Return the info of the last frame, whichever method ran it."""
         return _info(self._info)
 
+    @one_at_a_time
     def self_test(self) -> float:
         """Run the model's golden frame; return the greatest difference from its image, relative to
         the peak.
@@ -309,6 +333,7 @@ class CoreEngine:
         self._check_frame(self._lib.eits_self_test(self._context, difference), "golden frame")
         return float(difference[0])
 
+    @one_at_a_time
     def self_test_sums(self) -> bytes:
         """Return section SUMS of this model: the core's revision, and a checksum of each frame of
         the set. The engine must be new and float32.

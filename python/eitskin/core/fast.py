@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine, aligned
 from eitskin.core.results import Info
 from eitskin.errors import FrameError, UsageError
+from eitskin.threads import one_at_a_time, refuse_copy
 
 
 @dataclass(frozen=True)
@@ -40,14 +41,20 @@ class AlignedFrame:
 
 
 class FastCore:
-    """The fast path that works beside a core ``engine`` and uses its reference and options.
+    """The fast path that works beside a core ``engine`` and uses its reference, its options and its
+    lock.
 
     Raises:
     UsageError: the model has no fields, or a drive has too many rows.
     """
 
     def __init__(self, engine: CoreEngine) -> None:
-        self._engine, (self._lib, self._ffi, model, context) = engine, engine.handles
+        self._engine, self.lock = engine, engine.lock
+        with self.lock:
+            self._begin_beside(*engine.handles)
+
+    def _begin_beside(self, lib: Any, ffi: Any, model: Any, context: Any) -> None:
+        self._lib, self._ffi = lib, ffi
         self.bytes = int(self._lib.eits_fast_size(model))
         if not self.bytes:
             raise UsageError(
@@ -63,6 +70,9 @@ class FastCore:
         self._number = self._ffi.new("uint32_t *")
         self.rows = [self._rows_of(k) for k in range(self._lib.eits_fast_drives(self._state))]
 
+    def __reduce__(self) -> NoReturn:
+        refuse_copy("a fast path", "make one beside the other engine")
+
     def _check(self, status: int) -> None:
         if status:
             text = self._ffi.string(self._lib.eits_status_text(status)).decode()
@@ -72,6 +82,7 @@ class FastCore:
         first = self._lib.eits_fast_rows(self._state, drive, self._number)
         return np.array(self._ffi.unpack(first, self._number[0]), dtype=np.int64)
 
+    @one_at_a_time
     def begin(self) -> None:
         """Start without touches, with the engine's reference.
 
@@ -81,6 +92,7 @@ class FastCore:
         """
         self._check(self._lib.eits_fast_begin(self._state))
 
+    @one_at_a_time
     def drive(self, number: int, volts: npt.ArrayLike, time_s: float) -> list[FastTouch]:
         """Process the rows ``self.rows[number]`` (r,) in V, nan where there is no value, measured
         at about ``time_s``; return the touches.
@@ -94,6 +106,7 @@ class FastCore:
         self._check(self._lib.eits_fast_drive(self._state, number, pointer, given.size, time_us))
         return self.touches()
 
+    @one_at_a_time
     def touches(self) -> list[FastTouch]:
         """Return the touches as of the last drive."""
         capacity = len(self._touches)
@@ -106,6 +119,7 @@ class FastCore:
             for one in self._touches[0 : self._number[0]]
         ]  # fmt: skip
 
+    @one_at_a_time
     def aligned(self, volts: npt.ArrayLike) -> AlignedFrame:
         """Return the rows (m,) in V of the last scan, corrected to the instant of its last drive.
         Call this once per frame.
@@ -125,6 +139,7 @@ class FastCore:
             bool(state & self._lib.EITS_FAST_TRUSTED),
         )
 
+    @one_at_a_time
     def confirm(self, found: Sequence[Touch]) -> list[FastTouch]:
         """Pass on the touches that the engine found in the last aligned frame; return the touches.
         Rows of electrodes that the engine named faulty are left out.
@@ -139,6 +154,7 @@ class FastCore:
         self._check(self._lib.eits_fast_confirm(self._state, given, len(found)))
         return self.touches()
 
+    @one_at_a_time
     def named(self, found: Info) -> Info:
         """Return ``found`` with the diagnostics of the last aligned frame that may be reported: if
         touches changed during its scan, only those that the two solved frames before also had. Call

@@ -1,9 +1,10 @@
 """Gesture events from touches over time, by the C core, as a board also makes them.
 docs/guide/gestures.md describes each event."""
 
+import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import load_core
 from eitskin.core.gestures_table import EventKind, EventPhase
 from eitskin.errors import UsageError
+from eitskin.threads import one_at_a_time, refuse_copy
 
 # kinds of events that have a direction, and those that have a value
 _DIRECTED = frozenset({EventKind.SWIPE})
@@ -108,7 +110,8 @@ class Zone:
 
 class Gestures:
     """Makes events from the tracked touches of each frame, including those of ``zones``.
-    ``options`` replace defaults of eits_gesture_options by name.
+    ``options`` replace defaults of eits_gesture_options by name. Threads may share one: each frame
+    is taken as a whole, in the order of the calls.
 
     Raises:
     UsageError: an option or a zone is not valid.
@@ -116,6 +119,7 @@ class Gestures:
 
     def __init__(self, zones: Sequence[Zone] = (), **options: float) -> None:
         module = load_core("float32")
+        self.lock = threading.RLock()
         self._lib, self._ffi = module.lib, module.ffi
         self._options = self._ffi.new("eits_gesture_options *")
         self._lib.eits_gestures_default(self._options)
@@ -132,6 +136,13 @@ class Gestures:
         self._zones = _ZoneState(zones, self._lib, self._ffi) if zones else None
         self.reset()
 
+    def __reduce__(self) -> NoReturn:
+        refuse_copy(
+            "gestures, which remember the fingers that are down,",
+            "make others of the same zones and options",
+        )
+
+    @one_at_a_time
     def reset(self) -> None:
         """Start again: no finger is down, no zone is pressed, and no event reports that anything
         ended."""
@@ -145,6 +156,7 @@ class Gestures:
         """The number of events and touches that did not fit into their buffers."""
         return int(self._state.dropped)
 
+    @one_at_a_time
     def update(self, touches: Iterable[Touch], time_us: int) -> list[GestureEvent]:
         """Return the events of the frame at ``time_us`` (modulo 2^32), those of zones last."""
         count = 0
@@ -168,6 +180,7 @@ class Gestures:
         events = [_event(self._events[k]) for k in range(made)]
         return events + ([] if self._zones is None else self._zones.update(self._events, made))
 
+    @one_at_a_time
     def press_zones(self, events: Sequence[GestureEvent]) -> list[GestureEvent]:
         """Return the events of zones that ``events``, which come from a board, press and
         release."""

@@ -1,7 +1,7 @@
 """A board's commands with their answers, and what it streams, whatever kind of device is behind
 it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,12 +9,13 @@ from eitskin.core.options_table import CHOICES
 from eitskin.core.results import Options, check_options
 from eitskin.device.exchange import ANSWER_S, CommandExchange
 from eitskin.device.link import Streamed
-from eitskin.device.streaming import packet_stream
+from eitskin.device.streaming import LEAVE_S, packet_stream
 from eitskin.device.upload import upload
 from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.device.wire.packets import BoardHashes, BoardInfo, BoardStats
 from eitskin.errors import DeviceError, UsageError
+from eitskin.threads import OneThreadAtATime
 
 TARE_FRAMES = 16
 
@@ -54,13 +55,14 @@ class Device(CommandExchange):
             DeviceError: the board refuses, or its core the frames.
         """
         wait_s = 3.0 + 2e-6 * max(self.board.frame_us, 1000) * (frames + 4)
-        self.command(commands.Tare(check_tare_frames(frames)), wait_s)
-        self.board = replace(self.board, tared=1)
+        with self.asking:
+            self.command(commands.Tare(check_tare_frames(frames)), wait_s)
+            self.board = replace(self.board, tared=1)
 
     def start_scene(self) -> int | None:
         """Begin what is to be touched, on a simulated or emulated board; call it after ``tare``.
         Nothing on a real one. Returns as ``Transport.begin_scene``."""
-        return self.transport.begin_scene()
+        return self.link.begin_scene()
 
     def scan(
         self,
@@ -78,6 +80,20 @@ class Device(CommandExchange):
             UsageError: a number is negative or does not fit its field.
             DeviceError: the board cannot do it; it keeps what it had.
         """
+        with self.asking:
+            return self._scan(
+                excitation_hz, sample_rate_hz, samples, settle_us, check_every, frame_period_us
+            )
+
+    def _scan(
+        self,
+        excitation_hz: float | None,
+        sample_rate_hz: int | None,
+        samples: int | None,
+        settle_us: int | None,
+        check_every: int | None,
+        frame_period_us: int | None,
+    ) -> BoardInfo:
         now = self.board
         if now.frames_given:
             raise DeviceError(
@@ -150,8 +166,9 @@ class Device(CommandExchange):
             DeviceError: the board is locked and nobody holds its button, or keeps no settings.
         """
         limit = commands.LIMIT_KEPT if current_limit_ua_rms is None else current_limit_ua_rms
-        self.command(commands.Settings(int(settings), limit), 10.0)
-        return self.info()
+        with self.asking:
+            self.command(commands.Settings(int(settings), limit), 10.0)
+            return self.info()
 
     def clear_faults(self) -> None:
         """Forget the faults that the board has raised; those that persist rise again."""
@@ -159,12 +176,13 @@ class Device(CommandExchange):
 
     def reset(self) -> BoardInfo:
         """Restart the board and wait until it answers; its reference is gone."""
-        self.command(commands.Reset(), ANSWER_S)
-        self.link.connected = False  # that it restarts was asked for
-        try:
-            return self.info()
-        finally:
-            self.link.connected = True
+        with self.asking:
+            self.command(commands.Reset(), ANSWER_S)
+            self.link.connected = False  # that it restarts was asked for
+            try:
+                return self.info()
+            finally:
+                self.link.connected = True
 
     def upload_model(
         self, model: str | Path | bytes, progress: Callable[[int, int], None] | None = None
@@ -176,8 +194,9 @@ class Device(CommandExchange):
             FileError, ModelError: it cannot be read, or is no model.
             DeviceError: it does not fit the board, or the link broke; the old model stays.
         """
-        upload(self, model, progress)
-        return self.info()
+        with self.asking:
+            upload(self, model, progress)
+            return self.info()
 
     # ---- streaming ----
 
@@ -189,21 +208,25 @@ class Device(CommandExchange):
         does.
 
         Raises:
-            UsageError: ``what``, ``every`` or ``frames`` cannot be.
+            UsageError: ``what``, ``every`` or ``frames`` cannot be, or another thread streams.
             DeviceError: the board refuses (no model, not tared), is gone, or has gone silent.
         """
         if not 0 < what <= 31 or not 1 <= every <= 0xFFFF or not 0 <= frames < 2**32:
             raise UsageError(
                 f"stream: what = {int(what)}, every = {every}, frames = {frames} cannot be"
             )
-        return self._streamed(what, every, frames)
+        advice = "end the loop there first"
+        return OneThreadAtATime(self._streamed(what, every, frames), "this stream", advice)
 
-    def _streamed(self, what: Stream, every: int, frames: int) -> Iterator[Streamed]:
+    def _streamed(self, what: Stream, every: int, frames: int) -> Generator[Streamed, None, None]:
         packets = packet_stream(self, what, every, frames)
         try:
             while not packets.over:
                 item = packets.next(None)
                 if item is not None:
                     yield item
+        except KeyboardInterrupt:
+            packets.stop(LEAVE_S)
+            raise
         finally:
             packets.stop()

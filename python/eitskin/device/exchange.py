@@ -3,9 +3,10 @@ stays in the link's queue."""
 
 import random
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from typing import TypeVar
+from typing import NoReturn, TypeVar
 
 from eitskin.device.check import check_board, no_answer
 from eitskin.device.link import (
@@ -25,6 +26,7 @@ from eitskin.device.wire.link_table import GetInfo, Keepalive, PacketType, Reply
 from eitskin.device.wire.packets import BoardHashes, BoardInfo, BoardStats, Reply
 from eitskin.device.wire.sequence import LinkCounters
 from eitskin.errors import DeviceError, EitskinError, UsageError
+from eitskin.threads import OneReader, refuse_copy, within
 
 ANSWERED_BY: dict[int, type] = {
     PacketType.GET_INFO: BoardInfo,
@@ -33,10 +35,15 @@ ANSWERED_BY: dict[int, type] = {
 }
 
 Self = TypeVar("Self", bound="CommandExchange")
+T = TypeVar("T")
 
 TRIES = 3
 ANSWER_S = 1.0
 AWAY_S = 120.0  # that a command waits for a port that is gone
+WORD_S = 0.2  # that the last word to a board may take
+OTHERS = (
+    "a board has one stream: read that one, or share it as a Session's consumers or by  --to udp:"
+)
 
 
 class CommandExchange:
@@ -45,6 +52,9 @@ class CommandExchange:
 
     Commands are sent again with the same request number where no answer comes, so that one lost
     packet does no harm. A board that does not answer ``TRIES`` times has fallen silent.
+
+    Threads may share a device: commands wait for their turn, and each gets its own answer, also
+    beside a stream. Frames go to one thread; another one that asks for them is refused.
 
     Raises:
         DeviceError: no answer, or another version.
@@ -61,8 +71,9 @@ class CommandExchange:
             self.link = ThreadedLink(transport, room, reconnect=reconnect)
         # a board remembers the last request; the numbers of two runs of the host must not meet
         self._request = 0 if pumped else random.randrange(1, 2**31)
-        self._asking = threading.RLock()
+        self.asking = threading.RLock()  # held where several commands belong together
         self._tap: Tap | None = None
+        self.reader = OneReader(f"the frames of {transport.name}", OTHERS)
         try:
             self.board = self.info()
         except BaseException:
@@ -91,13 +102,26 @@ class CommandExchange:
         return self.link.counters
 
     def close(self) -> None:
-        """Let go of the port, after a word to the board, whose current stops; may be called
-        twice."""
+        """Let go of the port, after a word to the board, whose current stops; may be called twice,
+        and from any thread. Takes no longer than a moment, whatever the port does."""
         if self.link.connected and not self.replays and not self.link.away:
             with suppress(EitskinError):
-                self.link.send(PacketType.KEEPALIVE, Keepalive(0).payload(0))
+                self.bounded(WORD_S, self._say_goodbye)
         self.link.connected = False
         self.link.close()
+
+    def _say_goodbye(self) -> None:
+        self.link.send(PacketType.KEEPALIVE, Keepalive(0).payload(0))
+
+    def bounded(self, limit_s: float, action: Callable[[], T]) -> T | None:
+        """``action``, which talks to the board, or None if that takes longer than ``limit_s``. A
+        board with a clock of its own is a part of this program and answers; there is no limit."""
+        if self.transport.capabilities.own_clock:
+            return action()
+        return within(limit_s, action)
+
+    def __reduce__(self) -> NoReturn:
+        refuse_copy(f"the device {self.transport.name}", "open its URL in the other process")
 
     def record(self, tap: Tap | None) -> None:
         """Give each packet that is accepted to ``tap`` as it comes, before anything else; None
@@ -125,7 +149,13 @@ class CommandExchange:
         return info
 
     def next_item(self, timeout_s: float) -> Streamed | None:
-        """Return the next streamed item; None if nothing comes within ``timeout_s``."""
+        """Return the next streamed item; None if nothing comes within ``timeout_s``.
+
+        Raises:
+            DeviceError: the port is gone for good.
+            UsageError: another thread reads the stream.
+        """
+        self.reader.check()
         return self.link.next(timeout_s)
 
     def _recorded_info(self) -> BoardInfo:
@@ -169,7 +199,7 @@ class CommandExchange:
             raise DeviceError(
                 f"{self.transport.name} is a recording: {command_name(command.TYPE)} needs a board"
             )
-        with self._asking:  # one command at a time; other threads wait for their turn
+        with self.asking:  # one command at a time; other threads wait for their turn
             return self._ask(command, timeout_s, refuse)
 
     def _ask(self, command: Command, timeout_s: float, refuse: bool) -> Answer:

@@ -5,6 +5,7 @@ The parts around it are simulated (firmware/boards/simulated). No processor time
 every time that depends on one is 0. Deterministic; no thread.
 """
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from eitskin.core.engine import aligned
 from eitskin.errors import DeviceError, UsageError
 from eitskin.model.eitm import decode_model
+from eitskin.threads import one_at_a_time
 
 WORKSPACE_BYTES = 4 << 20  # enough for any model that fits a bank
 OUTPUT_BYTES = 1 << 16
@@ -30,6 +32,7 @@ def _load() -> Any:
 
 class HostBoard:
     """The firmware's application on this host, switched on, with what its two ``banks`` hold.
+    Each method holds ``lock``, since C allows one thread at a time.
 
     ``name`` and ``serial`` are those in INFO; ``period_us`` of its first frames; ``frames_given``:
     by another instrument.
@@ -48,6 +51,7 @@ class HostBoard:
         frames_given: bool = False,
     ) -> None:
         module = _load()
+        self.lock = threading.RLock()
         self._ffi, self._lib = module.ffi, module.lib
         self._banks = [aligned(len(bank)) for bank in banks]
         for cells, bank in zip(self._banks, banks, strict=True):
@@ -77,14 +81,17 @@ class HostBoard:
         """The contents of the flash banks as they are now."""
         return [bytes(cells) for cells in self._banks]
 
+    @one_at_a_time
     def restart(self) -> None:
         """Switch it off and on again: time goes on, the banks stay."""
         self._lib.sim_start(self._sim)
 
+    @one_at_a_time
     def receive(self, data: bytes) -> None:
         """Give the board bytes from the host; it carries out the commands in them."""
         self._lib.sim_write(self._sim, self._ffi.from_buffer(data), len(data))
 
+    @one_at_a_time
     def take_output(self) -> bytes:
         """Return the bytes that the board has sent since the last call."""
         violation = self._lib.sim_violation(self._sim)
@@ -96,15 +103,18 @@ class HostBoard:
             pieces.append(bytes(self._ffi.buffer(self._output, size)))
         return b"".join(pieces)
 
+    @one_at_a_time
     def hold_button(self, held: bool) -> None:
         """The owner holds the blue button, or lets go of it."""
         self._lib.sim_press(self._sim, held)
 
     @property
+    @one_at_a_time
     def wanted(self) -> bool:
         """Whether a stream or a tare waits for frames."""
         return bool(self._lib.sim_wants_frame(self._sim))
 
+    @one_at_a_time
     def new_model(self) -> Any | None:
         """The model in use, decoded, where it is another than at the last call; else None."""
         blob = self._lib.sim_model(self._sim, self._bytes, self._crc)
@@ -123,6 +133,7 @@ class GivenBoard(HostBoard):
     def __init__(self, name: str, serial: str, banks: list[bytes], *, period_us: int) -> None:
         super().__init__(name, serial, banks, period_us=period_us, frames_given=True)
 
+    @one_at_a_time
     def give(self, voltage_v: Any, passed_us: int, period_us: int) -> None:
         """One frame (m,), real or complex, in the rows of the model in use; NaN is a row that
         cannot be used. It began ``passed_us`` after the last one, and they come about every
@@ -131,10 +142,12 @@ class GivenBoard(HostBoard):
         self._lib.sim_give_frame(self._sim, self._pointer(iq, "float *"), passed_us, period_us)
 
     @property
+    @one_at_a_time
     def tares(self) -> bool:
         """Whether a tare waits for frames."""
         return bool(self._lib.sim_tares(self._sim))
 
+    @one_at_a_time
     def let_pass(self, passed_us: int) -> None:
         """No frame has come for ``passed_us`` more."""
         self._lib.sim_let_pass(self._sim, passed_us)

@@ -31,6 +31,7 @@ from eitskin.device.wire.packets import (
 from eitskin.device.wire.payloads import MalformedPacket, parse
 from eitskin.device.wire.sequence import LinkCounters
 from eitskin.errors import DeviceError, EitskinError
+from eitskin.threads import FairLock, within
 
 Answer = Reply | BoardInfo | BoardStats | BoardHashes
 FramePart = RawFrame | SolvedImage | SolvedTouches | FrameEvents
@@ -39,6 +40,7 @@ ROOM = 1024
 ANSWERS = 64  # that nobody waits for; older ones are forgotten
 USELESS = 10_000  # packets in a row that are neither streamed nor answers
 READ_S = 0.1
+CLOSE_S = 0.5  # that letting go of a port may take
 KEEPALIVE_S = 0.25  # a board lets no current flow where it hears nothing for a second
 KEEPALIVE = Keepalive(1).payload(0)
 PACKET_S = 1e-3  # no packet takes less of a board's own time
@@ -47,8 +49,9 @@ Tap = Callable[[Packet], None]
 
 
 class Link(ABC):
-    """The queue, and how packets get into it. Safe to be used by several threads: each answer goes
-    to whoever waits for its request.
+    """The queue, and how packets get into it. Several threads may use it: each answer goes to
+    whoever waits for its request. After ``close`` every call raises a DeviceError that says so, in
+    whatever thread it waits.
 
     Attributes:
         connected: the board has answered; from now on an INFO without a request says that it
@@ -67,6 +70,7 @@ class Link(ABC):
         self._tapping = threading.Lock()
         self._last = self._sequence = 0
         self._heard_s: float | None = None  # when something was sent last
+        self._closed_by: str | None = None  # the name of the thread that closed it
 
     def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
         """Call ``begin`` with the last packet's sequence number, then ``tap`` with each packet
@@ -121,9 +125,25 @@ class Link(ABC):
         with self._changed:
             self._queue = deque(one for one in self._queue if isinstance(one, Fault | LinkEvent))
 
+    def begin_scene(self) -> int | None:
+        """``Transport.begin_scene``, with no other thread at the port."""
+        return self.transport.begin_scene()
+
     @abstractmethod
     def close(self) -> None:
-        """Stop and let go of the port."""
+        """Stop and let go of the port, within CLOSE_S whatever the port does."""
+
+    def _note_closed(self) -> None:
+        with self._changed:
+            self._closed_by = self._closed_by or threading.current_thread().name
+            self._changed.notify_all()
+
+    def _refuse_closed(self) -> None:
+        if self._closed_by is not None:
+            raise DeviceError(
+                f"{self.transport.name}: it was closed, in thread {self._closed_by!r}; open it"
+                " again"
+            )
 
     # ---- into the queue and out of it ----
 
@@ -195,7 +215,7 @@ class PumpedLink(Link):
 
     def __init__(self, transport: Transport, room: int = ROOM) -> None:
         super().__init__(transport, room)
-        self._pumping = threading.RLock()
+        self._pumping = FairLock()  # of one read, so that others get their turn
         self._decoded: deque[Packet] = deque()  # of one read, not in the queue yet
 
     def begin_tap(self, begin: Callable[[int], None], tap: Tap) -> None:
@@ -210,8 +230,9 @@ class PumpedLink(Link):
 
     def next(self, timeout_s: float) -> Streamed | None:
         useless = 0
-        with self._pumping:
-            while True:
+        while True:
+            with self._pumping:
+                self._refuse_closed()
                 with self._changed:
                     item = self._fetch()
                 if item is not None:
@@ -230,8 +251,9 @@ class PumpedLink(Link):
         """As ``Link.answer``; each packet that comes takes a part of ``timeout_s``, so that a board
         that talks without answering is given up too."""
         rest_s = timeout_s - PACKET_S
-        with self._pumping:
-            while True:
+        while True:
+            with self._pumping:
+                self._refuse_closed()
                 with self._changed:
                     found = self._fetch_answer(fits)
                 if found is not None:
@@ -278,12 +300,23 @@ class PumpedLink(Link):
 
     def send(self, packet_type: int, payload: bytes) -> None:
         with self._pumping:
+            self._refuse_closed()
             self.transport.write(encode(packet_type, self._sequence, payload))
             self._sequence += 1
             self._heard_s = self.transport.board_s
 
+    def begin_scene(self) -> int | None:
+        with self._pumping:
+            return super().begin_scene()
+
     def close(self) -> None:
-        self.transport.close()
+        self._note_closed()
+        alone = self._pumping.acquire(CLOSE_S)  # else the other thread's read fails
+        try:
+            self.transport.close()
+        finally:
+            if alone:
+                self._pumping.release()
 
 
 @dataclass(frozen=True)
@@ -325,11 +358,17 @@ class ThreadedLink(Link):
 
     def _await(self, ready: Callable[[], bool], timeout_s: float) -> None:
         """Wait until ``ready``, with the condition held. Raises as ``next``."""
-        done = self._changed.wait_for(lambda: ready() or self._failed is not None, timeout_s)
+        done = self._changed.wait_for(lambda: ready() or self._over, timeout_s)
         if done and not ready():
             self._raise_failed()
 
+    @property
+    def _over(self) -> bool:
+        """Nothing will come any more."""
+        return self._failed is not None or self._closed_by is not None
+
     def _raise_failed(self) -> None:
+        self._refuse_closed()
         if self._failed is not None:
             raise type(self._failed)(str(self._failed))
 
@@ -358,13 +397,17 @@ class ThreadedLink(Link):
 
     def await_port(self, timeout_s: float) -> None:
         with self._changed:
-            self._changed.wait_for(lambda: not self._away or self._failed is not None, timeout_s)
+            self._changed.wait_for(lambda: not self._away or self._over, timeout_s)
             self._raise_failed()
 
     def close(self) -> None:
+        self._note_closed()
         self._stopping.set()
+        within(CLOSE_S, self._let_go)
+
+    def _let_go(self) -> None:
         self.transport.close()
-        self._thread.join(timeout=5.0)
+        self._thread.join(timeout=CLOSE_S)
 
     # ---- the thread ----
 

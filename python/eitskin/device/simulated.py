@@ -15,6 +15,7 @@ from eitskin.device.transport import Capabilities, SimulatedScene, Transport
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.board_frames import BoardFrames
 from eitskin.scene.library_scenes import find_scene
+from eitskin.threads import one_at_a_time
 
 
 class SimBoard(HostBoard):
@@ -32,14 +33,17 @@ class SimBoard(HostBoard):
         self.frames = frames
 
     @property
+    @one_at_a_time
     def ended(self) -> bool:
         """Whether the scene is over when the next scan begins."""
         return bool(self._lib.sim_scene_over(self._sim))
 
+    @one_at_a_time
     def begin_scene(self) -> None:
         """Let the scene begin with the next scan."""
         self._lib.sim_begin_scene(self._sim)
 
+    @one_at_a_time
     def scan_one(self) -> bool:
         """Scan one frame; False where nobody wants one.
 

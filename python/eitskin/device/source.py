@@ -19,6 +19,7 @@ from eitskin.device.transport import Capabilities, LinkEvent, Transport
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.threads import FairLock
 
 GROUP = "eitskin.sources"
 POLL_S = 0.02
@@ -98,7 +99,7 @@ class SourceTransport(Transport):
         self.board = GivenBoard(
             short, serial, [bank_bytes(blob, 1), empty], period_us=self._period_us()
         )
-        self._lock = threading.Lock()
+        self._lock = FairLock()  # a command gets its turn between two frames, also in a flood
         self._written = threading.Event()
         self._rows = self._given = 0
         self._board_s = self._last_s = time.monotonic()  # of the board's clock, of the last frame
@@ -177,22 +178,25 @@ class SourceTransport(Transport):
 
     def _give(self, frames: list[GivenFrame]) -> None:
         now = time.monotonic()
-        with self._lock:
-            if not frames:
+        if not frames:
+            with self._lock:
                 self._miss(now)
-                return
-            self._use_model()
-            for frame in frames:
-                if frame.voltage_v.shape != (self._rows,):
-                    raise FrameError(
-                        f"{self.name}: a frame of shape {frame.voltage_v.shape}; the model has"
-                        f" {self._rows} rows"
-                    )
-                came_s = now if frame.came_s is None else frame.came_s
-                passed_us = self._passed_us(frame, came_s)
-                self.board.give(frame.voltage_v, passed_us, self._period_us(passed_us))
-                self._board_s = self._last_s = came_s
-                self._given += 1
+        for frame in frames:
+            with self._lock:
+                self._give_one(frame, now)
+
+    def _give_one(self, frame: GivenFrame, now: float) -> None:
+        self._use_model()
+        if frame.voltage_v.shape != (self._rows,):
+            raise FrameError(
+                f"{self.name}: a frame of shape {frame.voltage_v.shape}; the model has"
+                f" {self._rows} rows"
+            )
+        came_s = now if frame.came_s is None else frame.came_s
+        passed_us = self._passed_us(frame, came_s)
+        self.board.give(frame.voltage_v, passed_us, self._period_us(passed_us))
+        self._board_s = self._last_s = came_s
+        self._given += 1
 
     def _use_model(self) -> None:
         model = self.board.new_model()

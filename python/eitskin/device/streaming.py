@@ -20,6 +20,8 @@ from eitskin.errors import DeviceError, EitskinError
 
 SILENCES = 3
 COMMAND_S = 1.0
+STOP_S = 3.5  # that a board may take to stop
+LEAVE_S = 0.5  # as much where somebody waits at the terminal for the program to end
 
 
 class PacketStream(Protocol):
@@ -39,8 +41,9 @@ class PacketStream(Protocol):
             DeviceError: the board refuses (no model, not tared), is gone, or has gone silent.
         """
 
-    def stop(self) -> bool:
-        """Tell the board to stop; False where it does not answer, which is not an error."""
+    def stop(self, limit_s: float = STOP_S) -> bool:
+        """Tell the board to stop, and let others read; False where it does not answer within
+        ``limit_s``, which is not an error. May be called twice."""
 
 
 def packet_stream(device: CommandExchange, what: Stream, every: int, frames: int) -> PacketStream:
@@ -103,7 +106,10 @@ class BoardPackets:
 
     def next(self, tick_s: float | None) -> Streamed | None:
         device = self._device
-        if not self._started:
+        if self._started:
+            device.reader.go_on(self)
+        else:
+            device.reader.begin(self)
             if device.link.away:
                 device.link.await_port(AWAY_S if tick_s is None else tick_s)
                 return None
@@ -146,11 +152,17 @@ class BoardPackets:
             self.over = self._is_over()
         return None
 
-    def stop(self) -> bool:
-        if not self._started:
+    def stop(self, limit_s: float = STOP_S) -> bool:
+        """A stream that another one of this thread took the place of is the board's no more."""
+        ours, started = self._device.reader.end(self), self._started
+        self._started, self.over = False, True
+        if not ours or not started:
             return True
         if self._device.link.away:
             return False
+        return self._device.bounded(limit_s, self._stop_board) is True
+
+    def _stop_board(self) -> bool:
         try:
             self._device.send_command(StreamCommand(0), COMMAND_S)
         except EitskinError:
@@ -219,9 +231,14 @@ class RecordedPackets:
         self._device, self._what = device, what
         self._every, self._frames = every, frames
         self._places: dict[int, int] = {}  # of each frame's number
-        self.over = False
+        self.over = self._begun = False
 
     def next(self, tick_s: float | None) -> Streamed | None:
+        if self._begun:
+            self._device.reader.go_on(self)
+        else:
+            self._device.reader.begin(self)
+            self._begun = True
         item = self._device.next_item(0.0)
         if item is None:
             self.over = True
@@ -237,5 +254,6 @@ class RecordedPackets:
         wanted = _KIND[type(item)] & self._what and place % self._every == 0
         return item if wanted else None
 
-    def stop(self) -> bool:
+    def stop(self, limit_s: float = STOP_S) -> bool:
+        self._device.reader.end(self)
         return True  # a recording needs no word

@@ -4,6 +4,7 @@ Each frame stands by itself: no tracker, no reference tracking, no limit of mult
 ``explain`` gives what a frame becomes on its way to the image, for tests.
 """
 
+import threading
 from dataclasses import dataclass, replace
 from time import perf_counter_ns
 
@@ -49,6 +50,7 @@ from eitskin.oracle.lasso import Lasso, greatest
 from eitskin.oracle.places import corrected
 from eitskin.oracle.reference import DEAD, fitted, noise_of, with_row_gains, without_outliers
 from eitskin.oracle.whitening import Whitening, project_out, whitening
+from eitskin.threads import one_at_a_time
 
 ROUNDS = 4  # of fitting discs and taking their interaction out of the data
 
@@ -69,14 +71,17 @@ class Explained:
 
 
 class OracleEngine:
-    """One model's frames to images and touches, by definition. Slow."""
+    """One model's frames to images and touches, by definition. Slow. Its methods hold ``lock``, as
+    those of the C core's engine."""
 
     def __init__(self, model: Model) -> None:
+        self.lock = threading.RLock()
         self.model, self.options = model, default_options(model)
         self.reference: Reference | None = None
         self._masked = np.zeros(model.protocol.n_rows, dtype=bool)
         self._last: FloatArray | None = None
 
+    @one_at_a_time
     def set_options(self, options: Options) -> None:
         """Replace the options.
 
@@ -95,16 +100,19 @@ class OracleEngine:
             wanted = bool(options.row_gains)
             self.reference = with_row_gains(self.model, self.reference, wanted)
 
+    @one_at_a_time
     def mask_rows(self, rows: BoolArray) -> None:
         """Leave the protocol rows where ``rows`` (m,) is true out of every frame."""
         self._masked = rows.copy()
 
+    @one_at_a_time
     def forget(self) -> None:
         """Forget the last coefficients, from which a warm start begins."""
         self._last = None
 
     # ---- the reference ----
 
+    @one_at_a_time
     def set_reference(self, frames: FloatArray) -> LearnedReference:
         """Take the reference from untouched ``frames`` (k, m) V: one to three as their mean, more
         also for the noise. docs/design/oracle.md, "Reference".
@@ -231,6 +239,7 @@ class OracleEngine:
 
     # ---- image ----
 
+    @one_at_a_time
     def reconstruct(self, frame: FloatArray, *, touches: bool = True) -> Reconstruction:
         """One frame (m,) V to image and touches.
 

@@ -19,6 +19,7 @@ from eitskin.sinks.outputs import Outputs
 from eitskin.truth import observe_scene
 
 DRAWN_S = 0.015
+STOPPED_S = 0.8  # that the board may take to stop, and then to be let go of
 FOR_EVER = Reconnect(tries=2**31, every_s=0.5)
 AttachOutputs = Callable[[Session], AbstractContextManager[Outputs | None]]
 
@@ -65,12 +66,16 @@ class SessionReader:
         self._thread.start()
 
     def stop(self) -> None:
-        """End, and let go of the board."""
+        """End, and let go of the board, within a moment whatever the board does."""
         self._stopping.set()
         self._again.set()
-        if self._opened is not None:
-            self._opened.stop()
-        self._thread.join(10.0)
+        session = self._opened
+        if session is not None:
+            session.stop()
+        self._thread.join(STOPPED_S)
+        if session is not None and self._thread.is_alive():
+            session.close()  # what it waits for fails
+            self._thread.join(STOPPED_S)
 
     def again(self) -> None:
         """Open the device again, where a session is over."""

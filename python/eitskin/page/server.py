@@ -130,7 +130,7 @@ class PageServer:
             server_header=False,
             date_header=False,
             access_log=False,
-            timeout_graceful_shutdown=1,
+            timeout_graceful_shutdown=0.2,  # pages are told, and gone
         )
         self._server = self._uvicorn.Server(config)
         self.reader.start()

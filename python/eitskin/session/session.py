@@ -12,17 +12,18 @@ import time
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
-from typing import TypeVar
+from typing import NoReturn, TypeVar
 
 from eitskin.core.results import Options
 from eitskin.device.bandwidth import carried_every
 from eitskin.device.client import TARE_FRAMES, Device
+from eitskin.device.exchange import OTHERS
 from eitskin.device.known_model import KnownModel, find_model, need_model
 from eitskin.device.link import Reconnect
 from eitskin.device.open import open_with_files
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.settings import ScanSettings, SolverSettings
-from eitskin.device.streaming import packet_stream
+from eitskin.device.streaming import LEAVE_S, STOP_S, packet_stream
 from eitskin.device.timing import split_timing
 from eitskin.device.transport import Capabilities
 from eitskin.device.wire.link_table import Setting, Stream
@@ -39,6 +40,7 @@ from eitskin.session.set_up import begin_scene, set_up, take_reference
 from eitskin.session.settings import KINDS, Say, SessionSettings
 from eitskin.session.summary import Summary
 from eitskin.session.zones import refuse_off_skin
+from eitskin.threads import OneReader, OneThreadAtATime, refuse_copy
 
 KEPT_ON = (
     "the board's owner has set keep-current: current flows on when this program ends;  eitskin"
@@ -57,9 +59,10 @@ class Session:
     ``speed``: of what is simulated, emulated or recorded, where the URL does not name one; 0 is as
     fast as it can. ``observe`` attaches an observer to the open session.
 
-    ``ask``, ``tare`` and ``stop`` may be called from any thread; all else belongs to the thread
-    that iterates. Whatever is asked gets an answer: it waits until the session has started, and is
-    refused once the session is over, or while the board is unplugged.
+    ``ask``, ``tare``, ``stop`` and ``close`` may be called from any thread; all else belongs to the
+    thread that iterates, and a second thread that iterates is refused. Whatever is asked gets an
+    answer: it waits until the session has started, and is refused once the session is over, or
+    while the board is unplugged.
 
     Attributes:
         device, known: the board and its model, where the host has that.
@@ -108,6 +111,9 @@ class Session:
         self._last_s: float | None = None  # of the last frame
         self._requests = Requests()
         self._stopping, self._started, self._every = threading.Event(), False, 1
+        self._starting = threading.RLock()
+        self._answers_s = STOP_S  # that the board may take to say what it counted
+        self._reading = OneReader("the messages of this session", OTHERS)
 
     def __enter__(self) -> "Session":
         try:
@@ -129,10 +135,16 @@ class Session:
     def close(self, reason: str = "") -> None:
         """Let go of the board and the recording, and answer what is still asked, with ``reason``;
         may be called twice."""
+        if not hasattr(self, "device"):
+            self._requests.close(reason or f"{self.url}: the session was closed; start again")
+            return
         self._requests.close(reason or f"{self.name}: the session is over; start again")
         if self.recorder is not None:
             self.recorder.close()
         self.device.close()
+
+    def __reduce__(self) -> NoReturn:
+        refuse_copy("a session", "open another one in the other process")
 
     @property
     def name(self) -> str:
@@ -161,7 +173,9 @@ class Session:
 
     def start(self) -> None:
         """Set up, take the reference, begin the scene; once."""
-        if not self._started:
+        with self._starting:
+            if self._started:
+                return
             self._started = True
             if self.known is not None:
                 refuse_off_skin(self.settings.zones, self.known.model.grid)
@@ -222,38 +236,51 @@ class Session:
         """Frames, reports after drives where the settings ask for them, and notices of what is new,
         until the scene, the recording or the number of frames is over. This is the one loop that
         every message passes; ``summary`` counts them."""
-        self.start()
+        advice = "Session.stop() ends it from any thread"
+        return OneThreadAtATime(self._guarded(), "the session's messages", advice)
+
+    def _guarded(self) -> Generator[Message, None, None]:
+        mine = object()
+        self._reading.begin(mine)
         reason = f"{self.name}: the session is over; start again"
         try:
-            yield from self._messages()
+            self.start()
+            yield from self._messages(mine)
         except GeneratorExit:
             raise
         except BaseException as error:
             reason = str(error) or reason
             raise
         finally:
+            self._reading.end(mine)
             self._requests.close(reason)
 
-    def _messages(self) -> Generator[Message, None, None]:
+    def _messages(self, mine: object) -> Generator[Message, None, None]:
         self._clock, self._count = Clock(), 0
         self._replay = Replay(self.settings.every or 1) if self.replays else None
         self._begin_stream()
+        limit_s = LEAVE_S  # unless the end is reached
         try:
             while not self._stopping.is_set():
+                self._reading.go_on(mine)
                 for message in self._due():
                     for seen in self._seen(message):
                         for consumer in self.consumers:
                             consumer(seen)
                         yield seen
-                    if self._stopping.is_set() or 0 < self.settings.frames <= self._count:
+                    if self._stopping.is_set():
+                        return
+                    if 0 < self.settings.frames <= self._count:
+                        limit_s = STOP_S
                         return
                 if self._packets.over:
                     if not self._begin_again():
+                        limit_s = STOP_S
                         return
                 elif self._requests.waiting:
                     self._answer_requests()
         finally:
-            self._packets.stop()
+            self._answers_s = limit_s if self._packets.stop(limit_s) else 0.0
 
     def _begin_stream(self) -> None:
         """Ask for the packets from now on, and for what puts them together."""
@@ -352,8 +379,9 @@ class Session:
         return self.observer.over(frame.board_us)
 
     def finish(self) -> Summary:
-        """The summary, with what the link and the board counted."""
-        self.summary.finish(self.device)
+        """The summary, with what the link and the board counted; a board that did not answer when
+        it was stopped is not asked."""
+        self.summary.finish(self.device, self._answers_s)
         return self.summary
 
     # ---- steps ----

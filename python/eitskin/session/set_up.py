@@ -1,13 +1,16 @@
 """The steps before a board's frames: scan, solver, reference, and the beginning of a scene."""
 
+from contextlib import suppress
+
 from eitskin.core.results import Options
 from eitskin.device.client import Device
 from eitskin.device.known_model import NAMES_IT, KnownModel
 from eitskin.device.settings import ScanSettings, SolverSettings, apply_scan
+from eitskin.device.streaming import LEAVE_S
 from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.link_table import Stream, StreamCommand
 from eitskin.device.wire.packets import Fault
-from eitskin.errors import DeviceError
+from eitskin.errors import DeviceError, EitskinError
 
 
 def set_up(
@@ -39,11 +42,18 @@ def take_reference(device: Device, frames: int, *, streamed: bool = False) -> No
     if not streamed:
         device.tare(frames)
         return
+
+    def stop() -> None:
+        device.send_command(StreamCommand(0), 1.0)
+
     device.send_command(StreamCommand(int(Stream.RAW)), 1.0)
     try:
         device.tare(frames)
-    finally:
-        device.send_command(StreamCommand(0), 1.0)
+    except BaseException:
+        with suppress(EitskinError):
+            device.bounded(LEAVE_S, stop)
+        raise
+    stop()
 
 
 def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:

@@ -1,5 +1,6 @@
 """The summary of a session."""
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -94,13 +95,11 @@ class Summary:
             lines.append(f"{self.refused} frames refused by the board's core")
         return lines
 
-    def finish(self, device: Device) -> None:
-        """Add what the link and the board counted; the part of a board that does not answer any
-        more is left out."""
+    def finish(self, device: Device, limit_s: float) -> None:
+        """Add what the link and the board counted; the part of a board that does not answer within
+        ``limit_s`` is left out. With 0 it is not asked."""
         self.link = device.counters.as_dict()
         self.board = None
-        if not device.replays and not device.link.ended and not device.link.away:
-            try:
-                self.board = device.stats()
-            except DeviceError:
-                self.board = None
+        if limit_s and not (device.replays or device.link.ended or device.link.away):
+            with suppress(DeviceError):
+                self.board = device.bounded(limit_s, device.stats)

@@ -2,16 +2,16 @@
 without Python's lock."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from queue import SimpleQueue
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import BoolArray
+from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import (
     LearnedReference,
@@ -24,6 +24,7 @@ from eitskin.errors import FrameError, UsageError
 from eitskin.model.eitm import encode_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
+from eitskin.threads import OneReader, OneThreadAtATime
 
 MAX_THREADS = 256
 MAX_IN_BLOCK = 32
@@ -50,7 +51,9 @@ class Batch:
 
     Each frame is reconstructed independently, as after :meth:`Reconstructor.forget`: bits, counts
     and ids (in the order of the frames) are the same for any number of threads. ``engine`` is "c"
-    or "c64"; ``threads`` None uses all processors.
+    or "c64"; ``threads`` None uses all processors. While a thread goes through ``each``, other
+    threads are refused: a batch uses the processors by itself. Pickled or copied, it keeps model,
+    options, masked rows and reference.
 
     Raises:
         UsageError: the engine is unknown, an option or the number of threads is out of range, or
@@ -76,8 +79,16 @@ class Batch:
         width = "float32" if engine == "c" else "float64"
         self._engines = [CoreEngine(content, width) for _ in range(self.threads)]
         self._on_each(lambda one: one.set_options(chosen))
+        self._made_of = model, threads, engine, chosen, content
+        self._masked: BoolArray | None = None
+        self._untouched: FloatArray | None = None
+        advice = "make a Batch per thread, or let that one finish"
+        self._turn = OneReader("the results of this Batch", advice)
         # the last usable frame, if any
         self._last = np.zeros((0, self._engines[0].n_rows))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, (*self._made_of, self._masked, self._untouched)
 
     def _on_each(self, call: Callable[[CoreEngine], T]) -> T:
         first, *_ = [call(engine) for engine in self._engines]
@@ -85,22 +96,52 @@ class Batch:
 
     def tare(self, untouched_v: npt.ArrayLike) -> LearnedReference:
         """Take the reference from untouched frames (k, m) or one (m,), in V; four or more also give
-        the noise."""
+        the noise.
+
+        Raises:
+            FrameError: a frame cannot be used.
+            UsageError: another thread goes through ``each``.
+        """
+        self._turn.check()
         frames = np.atleast_2d(np.asarray(untouched_v, dtype=np.float64))
         check_shape(frames, self._engines[0].n_rows, "reference", least=1)
         self._last = self._last[:0]
-        return self._on_each(lambda one: one.set_reference(frames))
+        learned = self._on_each(lambda one: one.set_reference(frames))
+        self._untouched = frames.copy()
+        return learned
 
     def mask_rows(self, rows: BoolArray) -> None:
         """Leave the rows of the protocol where ``rows`` (m,) is true out of every frame; call this
-        before ``tare``."""
+        before ``tare``. Raises a UsageError while another thread goes through ``each``."""
+        self._turn.check()
         self._on_each(lambda one: one.mask_rows(rows))
+        self._masked = rows.copy()
 
     def each(
         self, frames_v: npt.ArrayLike, *, touches: bool = True
     ) -> Iterator[Reconstruction | FrameError]:
         """Yield the results of frames (k, m) in V, in their order; for a frame that cannot be used,
-        yield its error. Ids count up from 1."""
+        yield its error. Ids count up from 1.
+
+        Raises:
+            UsageError: another thread goes through ``each``.
+        """
+        advice = "read it in one thread"
+        return OneThreadAtATime(self._each(frames_v, touches), "this batch", advice)
+
+    def _each(
+        self, frames_v: npt.ArrayLike, touches: bool
+    ) -> Generator[Reconstruction | FrameError, None, None]:
+        mine = object()
+        self._turn.begin(mine)
+        try:
+            yield from self._numbered(mine, frames_v, touches)
+        finally:
+            self._turn.end(mine)
+
+    def _numbered(
+        self, mine: object, frames_v: npt.ArrayLike, touches: bool
+    ) -> Iterator[Reconstruction | FrameError]:
         frames = np.asarray(frames_v, dtype=np.float64)
         check_shape(frames, self._engines[0].n_rows, "frames")
         size = max(1, min(MAX_IN_BLOCK, len(frames) // (4 * self.threads)))
@@ -112,14 +153,17 @@ class Batch:
             # the very first block uses the engine without earlier frames
             engine = free.get() if start > 0 else self._engines[0]
             try:
-                engine.follow(np.vstack([self._last, frames[max(0, start - MAX_IN_BLOCK) : start]]))
-                return engine.reconstruct_block(frames[start : start + size], touches=touches)
+                with engine.lock:
+                    before = frames[max(0, start - MAX_IN_BLOCK) : start]
+                    engine.follow(np.vstack([self._last, before]))
+                    return engine.reconstruct_block(frames[start : start + size], touches=touches)
             finally:
                 free.put(engine)
 
         next_id, number, last = 1, 0, self._last
         with ThreadPoolExecutor(self.threads) as pool:
             for results in pool.map(run, range(0, len(frames), size)):
+                self._turn.go_on(mine)
                 for result in results:
                     number += 1
                     if isinstance(result, FrameError):
@@ -130,6 +174,24 @@ class Batch:
                     yield replace(result, touches=tuple(numbered))
                     next_id += len(result.touches)
         self._last = last
+
+
+def _again(
+    model: Model,
+    threads: int | None,
+    engine: str,
+    options: Options,
+    blob: bytes,
+    masked: BoolArray | None,
+    untouched: FloatArray | None,
+) -> Batch:
+    """The batch that was pickled."""
+    made = Batch(model, threads=threads, engine=engine, options=options, blob=blob)
+    if masked is not None:
+        made.mask_rows(masked)
+    if untouched is not None:
+        made.tare(untouched)
+    return made
 
 
 def reconstruct_many(

@@ -1,7 +1,8 @@
 """Reconstruct images and touches from frames with one interface for all engines: the C core or the
 numpy oracle."""
 
-from collections.abc import Iterable, Iterator
+import threading
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -20,14 +21,16 @@ from eitskin.core.results import (
     check_shape,
 )
 from eitskin.errors import FrameError, ProtocolError, UsageError
-from eitskin.model.eitm import encode_model, load_model
+from eitskin.model.eitm import decode_model, encode_model, load_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin.oracle.engine import OracleEngine
 from eitskin.skin.protocol import Protocol
+from eitskin.threads import OneReader, OneThreadAtATime
 
 ENGINES = ("c", "c64", "numpy")
 MIN_CORRELATION = 0.9
+OTHERS = "use a Reconstructor per stream, or let that one end"
 
 
 class Reconstructor:
@@ -39,6 +42,12 @@ class Reconstructor:
     fitted in its own way and have no confidence). Problems of a frame are detected, affected rows
     are left out if that helps, and ``info.found`` names them (docs/reference/diagnostics.md); the
     option ``diagnostics`` chooses what is checked.
+
+    Threads may share one: each call is carried out as a whole, and touches are tracked in the order
+    of the calls. Streams that should not share touches need a reconstructor each, so a second
+    thread cannot begin a stream beside another's. Pickled or copied, it keeps model, options,
+    masked rows and reference as they were given; tracked touches, and what the reference has
+    learned since the tare, stay behind.
 
     Raises:
         ModelError: the C core rejects the model.
@@ -63,6 +72,10 @@ class Reconstructor:
             self._engine = CoreEngine(
                 blob or encode_model(model), "float32" if engine == "c" else "float64"
             )
+        self.lock: threading.RLock = self._engine.lock
+        self._blob, self._masked = blob, np.zeros(model.protocol.n_rows, dtype=bool)
+        self._untouched: FloatArray | None = None
+        self._streams = OneReader("the touches of this Reconstructor's stream", OTHERS)
         self._options = default_options(model)
         self.set_options(options or self._options)
 
@@ -72,6 +85,11 @@ class Reconstructor:
         ``load_model``."""
         model, blob = load_model(path)
         return cls(model, engine=engine, blob=blob)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        with self.lock:
+            blob = self._blob or encode_model(self.model)
+            return _again, (blob, self.engine, self._options, self._masked, self._untouched)
 
     @property
     def c_engine(self) -> CoreEngine | None:
@@ -93,10 +111,11 @@ class Reconstructor:
         for name in changes:
             if name not in known:
                 raise UsageError(f"options: {name!r} is unknown; {nearest(name, known)}")
-        wanted = replace(self._options if options is None else options, **changes)
-        check_options(wanted)
-        self._engine.set_options(wanted)
-        self._options = wanted
+        with self.lock:
+            wanted = replace(self._options if options is None else options, **changes)
+            check_options(wanted)
+            self._engine.set_options(wanted)
+            self._options = wanted
 
     def check_protocol(self, protocol: Protocol) -> None:
         """Check that ``protocol`` is the model's.
@@ -122,7 +141,10 @@ class Reconstructor:
         """
         frames = np.atleast_2d(_numbers(untouched_v, "reference"))
         check_shape(frames, self.model.protocol.n_rows, "reference", least=1)
-        return self._engine.set_reference(frames)
+        with self.lock:
+            learned = self._engine.set_reference(frames)
+            self._untouched = frames.copy()
+        return learned
 
     def mask_rows(self, rows: BoolArray) -> None:
         """Leave the rows of the protocol where ``rows`` (m,) is true out of every frame; call this
@@ -137,7 +159,9 @@ class Reconstructor:
                 f"mask: is {given.dtype} {given.shape}, but must be one truth value for each of"
                 f" {count} rows"
             )
-        self._engine.mask_rows(given)
+        with self.lock:
+            self._engine.mask_rows(given)
+            self._masked = given.copy()
 
     def reconstruct(self, frame_v: npt.ArrayLike, *, touches: bool = True) -> Reconstruction:
         """Reconstruct one frame (m,) in V.
@@ -149,9 +173,22 @@ class Reconstructor:
         return replace(result, model=self.model)
 
     def stream(self, frames_v: Iterable[npt.ArrayLike]) -> Iterator[Reconstruction]:
-        """Reconstruct frames one after another; a touch keeps its id from frame to frame."""
-        for frame in frames_v:
-            yield self.reconstruct(frame)
+        """Reconstruct frames one after another; a touch keeps its id from frame to frame.
+
+        Raises:
+            FrameError: a frame cannot be used, or no reference has been taken.
+            UsageError: another thread streams.
+        """
+        return OneThreadAtATime(self._streamed(frames_v), "this stream", OTHERS)
+
+    def _streamed(self, frames_v: Iterable[npt.ArrayLike]) -> Generator[Reconstruction, None, None]:
+        mine = object()
+        self._streams.begin(mine)
+        try:
+            for frame in frames_v:
+                yield self.reconstruct(frame)
+        finally:
+            self._streams.end(mine)
 
     def forget(self) -> None:
         """Forget the coefficients for the warm start and the tracked touches, so that the next
@@ -159,8 +196,25 @@ class Reconstructor:
         self._engine.forget()
 
 
+def _again(
+    blob: bytes, engine: str, options: Options, masked: BoolArray, untouched: FloatArray | None
+) -> Reconstructor:
+    """The reconstructor that was pickled."""
+    made = Reconstructor(
+        decode_model(blob, "a pickled Reconstructor"), engine=engine, options=options, blob=blob
+    )
+    if masked.any():
+        made.mask_rows(masked)
+    if untouched is not None:
+        made.tare(untouched)
+    return made
+
+
 def _numbers(values: npt.ArrayLike, what: str) -> FloatArray:
+    """``values`` as an array; what a numpy mask hides is NaN, which no row can use."""
     try:
+        if isinstance(values, np.ma.MaskedArray):
+            return np.where(np.ma.getmaskarray(values), np.nan, np.asarray(values, np.float64))
         return np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise FrameError(

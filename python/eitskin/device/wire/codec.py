@@ -1,6 +1,7 @@
 """The C codec through cffi: packets to bytes and bytes to packets, with every byte that is no
 packet counted."""
 
+import threading
 import zlib
 from collections import deque
 from dataclasses import dataclass, replace
@@ -11,6 +12,7 @@ from eitskin.core.engine import load_core
 from eitskin.device.wire.link_table import LINK_MAX_PAYLOAD, PacketType
 from eitskin.device.wire.sequence import LATE_IN_A_ROW, LinkCounters, SequenceCheck
 from eitskin.errors import DeviceError
+from eitskin.threads import one_at_a_time
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,7 @@ class Decoder:
 
     def __init__(self, counters: LinkCounters | None = None) -> None:
         module = _core()
+        self.lock = threading.RLock()
         self._lib, self._ffi = module.lib, module.ffi
         room = int(self._lib.EITS_LINK_MAX_PACKET)
         self._buffer = self._ffi.new("uint64_t[]", (room + 7) // 8)
@@ -76,17 +79,20 @@ class Decoder:
         """The link version of the last packet that had another than ours; None if none had."""
         return int(self._state.other_version) if self._state.version_errors else None
 
+    @one_at_a_time
     def link_lost(self) -> None:
         """The line was cut: what is half received is no error, and any packet may come next; it
         will count as one gap."""
         self._begin(self._state.room)
         self._sequence.link_lost()
 
+    @one_at_a_time
     def forget_sequence(self) -> None:
         """The next packet is taken whatever its number; used where everything has been refused for
         too long."""
         self._sequence.link_lost()
 
+    @one_at_a_time
     def feed(self, data: bytes) -> list[Packet]:
         """The packets that ``data`` completes. Those that are no news (duplicates, late ones) are
         counted and left out."""
