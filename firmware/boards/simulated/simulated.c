@@ -416,6 +416,14 @@ bool sim_tares(const sim_board *sim)
     return fw_tare_active(&sim->instrument.solve);
 }
 
+bool sim_mask_row(sim_board *sim, uint32_t row, bool masked)
+{
+    fw_solve *solve = &sim->instrument.solve;
+    const bool before = eits_is_masked(solve->engine.ctx, row) != 0;
+    fw_solve_mask_row(solve, row, masked);
+    return before;
+}
+
 const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc)
 {
     const fw_solve *solve = &sim->instrument.solve;

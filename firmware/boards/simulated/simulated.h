@@ -103,6 +103,10 @@ void sim_press(sim_board *sim, bool held);
 bool sim_wants_frame(const sim_board *sim);
 bool sim_tares(const sim_board *sim); /* a tare does */
 
+/* Leave a row of the open model out of every frame, or use it again, also while a tare waits for
+ * its first frame. Returns whether it was left out before. */
+bool sim_mask_row(sim_board *sim, uint32_t row, bool masked);
+
 /* The open model, its length and its CRC-32; NULL if there is none. */
 const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc);
 

@@ -148,6 +148,12 @@ class GivenBoard(HostBoard):
         return bool(self._lib.sim_tares(self._sim))
 
     @one_at_a_time
+    def mask_row(self, row: int, masked: bool) -> bool:
+        """Leave ``row`` of the model in use out of every frame, or use it again, also while a tare
+        waits for its first frame. Returns whether it was left out before."""
+        return bool(self._lib.sim_mask_row(self._sim, row, masked))
+
+    @one_at_a_time
     def let_pass(self, passed_us: int) -> None:
         """No frame has come for ``passed_us`` more."""
         self._lib.sim_let_pass(self._sim, passed_us)

@@ -9,10 +9,12 @@ import threading
 import time
 import zlib
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import entry_points
 
-from eitskin.arrays import AnyArray
+import numpy as np
+
+from eitskin.arrays import AnyArray, BoolArray
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.host_board import GivenBoard
 from eitskin.device.transport import Capabilities, LinkEvent, Transport
@@ -26,6 +28,8 @@ POLL_S = 0.02
 PERIOD_US = 20_000  # where nothing else is known
 MAX_GAP_S = 60.0
 SILENT_S, SILENT_PERIODS = 1.0, 4  # until it is a fault that no frame comes
+LOOKED_AT = 4  # frames of a tare that show which rows cannot be used
+NAMED = 8  # rows that are named in a message
 PERIODS = 16  # frame periods that the reported rate is the mean of
 
 
@@ -87,7 +91,12 @@ class Source:
 
 class SourceTransport(Transport):
     """The application, built for this host, that gets a source's frames. ``model`` goes into its
-    first bank (None: the prebuilt one)."""
+    first bank (None: the prebuilt one).
+
+    A tare needs all rows that are not masked. Rows that cannot be used in at least half of its
+    first frames are therefore masked until the next tare; a single reading that is missing later is
+    replaced by the mean of its row, so that it does not change the reference.
+    """
 
     def __init__(self, url: str, source: Source, model: bytes | None = None) -> None:
         self.url, self.source = url, source
@@ -104,6 +113,9 @@ class SourceTransport(Transport):
         self._rows = self._given = 0
         self._board_s = self._last_s = time.monotonic()  # of the board's clock, of the last frame
         self._last_time_s: float | None = None
+        self._tare: _TareRows | None = None  # of the tare that is under way
+        self._left_out: set[int] = set()  # rows that were masked here
+        self._events: list[LinkEvent] = []
         try:
             self._use_model()
         except BaseException:
@@ -150,6 +162,8 @@ class SourceTransport(Transport):
         if not self.source.synchronous:
             self._await_command(timeout_s)
         with self._lock:
+            if self._tare is not None and self.board.tares:
+                self._give_held(self._tare)
             if self.board.tares:
                 self.board.let_pass(round(1e6 * SILENT_S))
             return self.board.take_output()
@@ -160,7 +174,9 @@ class SourceTransport(Transport):
         self._written.set()
 
     def take_events(self) -> list[LinkEvent]:
-        return self.source.take_events()
+        with self._lock:
+            events, self._events = self._events, []
+        return self.source.take_events() + events
 
     def reopen(self) -> bool:
         return self.source.reopen()
@@ -193,10 +209,40 @@ class SourceTransport(Transport):
                 f" {self._rows} rows"
             )
         came_s = now if frame.came_s is None else frame.came_s
+        frame = replace(frame, came_s=came_s)
+        if not self.board.tares:
+            self._pass_on(frame, came_s)
+            return
+        if self._tare is None:
+            self._tare = _TareRows()
+        if self._tare.looks:
+            self._tare.held.append(frame)
+            if len(self._tare.held) == LOOKED_AT:
+                self._give_held(self._tare)
+        else:
+            self._pass_on(self._tare.filled(frame), came_s)
+
+    def _give_held(self, tare: "_TareRows") -> None:
+        """Mask the rows that the frames looked at cannot use, and pass those frames on."""
+        bad = set(np.flatnonzero(tare.look()).tolist())
+        for row in self._left_out - bad:
+            self.board.mask_row(row, False)
+        masked_before = {row for row in bad if self.board.mask_row(row, True)}
+        self._left_out = (self._left_out & bad) | (bad - masked_before)
+        if bad:
+            self._events.append(LinkEvent("rows", len(bad), _left_out_text(bad, self._rows)))
+        held, tare.held = tare.held, []
+        for frame in held:
+            assert frame.came_s is not None
+            self._pass_on(tare.filled(frame), frame.came_s)
+
+    def _pass_on(self, frame: GivenFrame, came_s: float) -> None:
         passed_us = self._passed_us(frame, came_s)
         self.board.give(frame.voltage_v, passed_us, self._period_us(passed_us))
         self._board_s = self._last_s = came_s
         self._given += 1
+        if not self.board.tares:
+            self._tare = None
 
     def _use_model(self) -> None:
         model = self.board.new_model()
@@ -229,6 +275,42 @@ class SourceTransport(Transport):
         if passed_us is not None and self._given:
             self._passed.append(passed_us)
         return max(round(sum(self._passed) / len(self._passed)), 1) if self._passed else PERIOD_US
+
+
+class _TareRows:
+    """The rows of a tare's frames: which of them cannot be used, and the means of the others."""
+
+    def __init__(self) -> None:
+        self.held: list[GivenFrame] = []
+        self.looks = True
+
+    def look(self) -> BoolArray:
+        """The rows (m,) that cannot be used in half of the frames that are held, or more."""
+        values = np.array([frame.voltage_v for frame in self.held])
+        usable = np.isfinite(values)
+        self.looks = False
+        self._count = usable.sum(axis=0)
+        self._sum = np.where(usable, values, 0.0).sum(axis=0)
+        return np.asarray(2 * self._count <= len(values))
+
+    def filled(self, frame: GivenFrame) -> GivenFrame:
+        """``frame`` with the mean of the row in place of each reading that is missing."""
+        missing = ~np.isfinite(frame.voltage_v) & (self._count > 0)
+        if not missing.any():
+            return frame
+        mean = self._sum / np.maximum(self._count, 1)
+        return replace(frame, voltage_v=np.where(missing, mean, frame.voltage_v))
+
+
+def _left_out_text(bad: set[int], rows: int) -> str:
+    named = ", ".join(str(row) for row in sorted(bad)[:NAMED])
+    more = f" and {len(bad) - NAMED} others" if len(bad) > NAMED else ""
+    which = f"row {named} (from 0) of {rows} cannot be used and is"
+    if len(bad) > 1:
+        which = f"{len(bad)} of {rows} rows cannot be used, {named}{more} (from 0), and are"
+    rest = "; too few rows are left, repair the instrument or its layout"
+    rest = rest if 2 * len(bad) > rows else ""
+    return f"{which} left out of the reference and of the frames{rest}"
 
 
 def source_schemes() -> tuple[str, ...]:

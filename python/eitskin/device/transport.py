@@ -52,7 +52,8 @@ class LinkEvent:
     """Something happened to the link itself. ``kind``: "gap" (at least ``missing`` packets are
     missing by their numbers), "dropped" (the host's queue left out ``missing``), "unplugged",
     "reconnected", "restarted" (the board restarted), "skipped" (``missing`` lines of another
-    instrument were not frames; without a text the event is only counted).
+    instrument were not frames; without a text the event is only counted), "rows" (a tare leaves
+    ``missing`` rows out).
     """
 
     kind: str

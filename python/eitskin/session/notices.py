@@ -88,6 +88,8 @@ def link_text(event: LinkEvent) -> str:
     """An event of the link in a line."""
     if event.kind == "skipped":
         return f"lines: {event.text}"
+    if event.kind == "rows":
+        return f"tare: {event.text}"
     counted = f" ({event.missing} packets)" if event.missing else ""
     return f"link: {event.kind}{counted}" + (f": {event.text}" if event.text else "")
 
