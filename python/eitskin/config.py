@@ -60,6 +60,20 @@ def parse_toml(text: str, what: str, where: str) -> dict[str, Any]:
         raise ConfigError(f"{where}: not a {what}: nested too deeply") from None
 
 
+def plain_number(text: str) -> float:
+    """The number in ``text`` as people write it: not Python's 1_0, and not the digits of other
+    scripts. Raises a ValueError."""
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r} is not a number")
+    return float(text)
+
+
+def plain_whole(text: str) -> int:
+    """As ``plain_number``, a whole number."""
+    plain_number(text)
+    return int(text)
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return a remedy for the unknown ``name``: the nearest of ``known``, or all of them if none is
     near."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path, PosixPath
 from typing import Any
 
+from eitskin.config import plain_number, plain_whole
 from eitskin.errors import UsageError
 
 
@@ -18,6 +19,10 @@ def above(low: float) -> float:
 
 RING_OHM = (above(0), 1e7)  # range of --resistor-ring
 SCENE_HELP = "a scene file, or a scene of the library (eitskin scene list)"
+
+
+PLAIN: dict[Any, Callable[[str], Any]] = {int: plain_whole, float: plain_number}
+plain_number.__name__, plain_whole.__name__ = "float", "int"  # argparse names them in its errors
 
 
 class Output(PosixPath):
@@ -80,8 +85,9 @@ def option(
         return
     if kind is None and isinstance(default, (int, float)):
         kind = type(default)
+    kind = PLAIN.get(kind, kind) if kind is not None else None
     if within is not None:
-        kind = _within(kind or int, listed[-1], *within)
+        kind = _within(kind or plain_whole, listed[-1], *within)
     if metavar is not None:
         more["metavar"] = metavar
     if default is not None:

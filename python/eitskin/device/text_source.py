@@ -4,6 +4,7 @@ import time
 from collections import deque
 from urllib.parse import unquote
 
+from eitskin.config import plain_number
 from eitskin.device.source import MAX_GAP_S, GivenFrame, Source, SourceTransport
 from eitskin.device.text_port import LinePort, open_port
 from eitskin.device.transport import LinkEvent
@@ -222,7 +223,7 @@ def open_text(url: str, *, model: bytes | None = None) -> SourceTransport:
 
 def _number(url: str, key: str, given: object, high: float) -> float:
     try:
-        value = float(str(given))
+        value = plain_number(str(given))
     except ValueError:
         value = 0.0
     if not 0 < value <= high:

@@ -3,10 +3,11 @@
 import math
 from dataclasses import dataclass
 
+from eitskin.config import plain_number
 from eitskin.errors import UsageError
 
 TIMED = ("sim", "emu", "file")  # schemes whose URLs may name a speed
-MAX_SPEED = 1000.0
+MIN_SPEED, MAX_SPEED = 1e-3, 1000.0
 
 
 @dataclass(frozen=True)
@@ -40,11 +41,22 @@ def split_timing(url: str) -> tuple[str, Timing]:
 def read_speed(text: str, where: str) -> float:
     """The speed in "2", "0.5" or "max" (0)."""
     try:
-        speed = 0.0 if text == "max" else float(text)
+        speed = 0.0 if text == "max" else plain_number(text)
     except ValueError:
         speed = math.nan
-    if not 0 <= speed <= MAX_SPEED:
+    return check_speed(speed, where, text)
+
+
+def check_speed(speed: float, where: str, text: str | None = None) -> float:
+    """``speed``, if it is 0 or within the range.
+
+    Raises:
+        UsageError: it is not; ``text`` is it as it was given.
+    """
+    if speed != 0 and not MIN_SPEED <= speed <= MAX_SPEED:
+        shown = f"{speed:g}" if text is None else repr(text)
         raise UsageError(
-            f"{where}: speed must be 0 to {MAX_SPEED:g} (0 or max: as fast as it can), not {text!r}"
+            f"{where}: speed must be {MIN_SPEED:g} to {MAX_SPEED:g}, or 0 or max for as fast as it"
+            f" can, not {shown}"
         )
     return speed

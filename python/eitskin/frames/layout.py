@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from eitskin.arrays import AnyArray
-from eitskin.config import check_keys, choice, flag, integer, load_toml, number, subtable
+from eitskin.config import (
+    check_keys,
+    choice,
+    flag,
+    integer,
+    load_toml,
+    number,
+    plain_number,
+    subtable,
+)
 from eitskin.errors import ConfigError, EitskinError, UsageError
 from eitskin.fileio import write_bytes
 from eitskin.frames.import_options import ImportOptions
@@ -196,7 +205,10 @@ class LineParser:
         if self.cells is None:
             if not any(parse_cell(cell) is not None for cell in cells):
                 raise BadLine(f"line {row.line} holds no number")
-            self._choose(len(cells))
+            try:
+                self._choose(len(cells))
+            except UsageError as error:  # perhaps the end of a line that was cut
+                raise BadLine(f"line {row.line}: {error}") from None
         if len(cells) != self.cells:
             raise BadLine(f"line {row.line} has {len(cells)} numbers where {self.cells} should be")
         values = _parsed([cells[k] for k in self._columns])
@@ -246,7 +258,7 @@ class LineParser:
 
 def _parsed(cells: Sequence[str]) -> AnyArray:
     try:
-        values: AnyArray = np.array([float(cell) for cell in cells])
+        values: AnyArray = np.array([plain_number(cell) for cell in cells])
     except ValueError:
         parsed = (parse_cell(cell) for cell in cells)
         values = np.array([complex("nan") if z is None else z for z in parsed])

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from datetime import datetime
+from itertools import chain, count
+from pathlib import Path
 from typing import Any, TypeVar
 
 from eitskin.device.client import TARE_FRAMES, Device
@@ -13,7 +15,7 @@ from eitskin.device.known_model import KnownModel
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.timing import read_speed
 from eitskin.device.wire.link_table import Stream
-from eitskin.errors import EitskinError, UsageError
+from eitskin.errors import EitskinError, FileError, UsageError
 from eitskin.model.eitm import decode_model
 from eitskin.page.reader import SessionReader
 from eitskin.session.session import Session
@@ -23,6 +25,13 @@ from eitskin.tuning.front import named_preset
 
 T = TypeVar("T")
 Answer = Future[str] | str
+
+
+def _free(path: Path) -> Path:
+    """``path``, or, if that file exists, as in the second in which another recording began, one
+    with a number."""
+    numbered = (path.with_stem(f"{path.stem}-{k}") for k in count(2))
+    return next(one for one in chain([path], numbered) if not one.exists())
 
 
 class PageCommands:
@@ -141,19 +150,29 @@ class PageCommands:
         session, folder = self._board("a recording"), self._reader.folder
 
         def action(device: Device) -> str:
-            if session.recorder is not None:
-                name, count = session.recorder.path.name, session.recorder.packets
-                session.recorder.close()
-                session.recorder = None
-                if not on:
-                    return f"recorded {count} packets in {name}"
-            if on:
-                name = f"eitskin-{datetime.now():%Y%m%d-%H%M%S}.eits"
-                session.recorder = Recorder(folder / name, device, session.solver)
-                return f"recording to {name}"
-            return "nothing is being recorded"
+            done = self._end_recording(session)
+            if not on:
+                return done or "nothing is being recorded"
+            path = _free(folder / f"eitskin-{datetime.now():%Y%m%d-%H%M%S}.eits")
+
+            def failed(error: FileError) -> None:  # the disk is full: the view goes on
+                self._reader.report(
+                    "notice", {"kind": "session", "text": str(error), "time_s": None}
+                )
+                self._changed(session, lambda device: self._end_recording(session))
+
+            session.recorder = Recorder(path, device, session.solver, failed=failed)
+            return f"recording to {path.name}"
 
         return self._changed(session, action)
+
+    def _end_recording(self, session: Session) -> str:
+        """End the recording, if there is one, and say what was recorded."""
+        recorder, session.recorder = session.recorder, None
+        if recorder is None:
+            return ""
+        recorder.close()
+        return f"recorded {recorder.packets} packets in {recorder.path.name}"
 
     def pace(self, what: str, speed: float | None = None) -> str:
         """ "play", "pause", "step" or "speed"."""

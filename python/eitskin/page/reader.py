@@ -19,7 +19,8 @@ from eitskin.sinks.outputs import Outputs
 from eitskin.truth import observe_scene
 
 DRAWN_S = 0.015
-STOPPED_S = 0.8  # that the board may take to stop, and then to be let go of
+STOPPED_S = 0.8  # that the board may take to stop
+SINKS_S = 4.0  # that the thread may take to end then; sinks have 3 s
 FOR_EVER = Reconnect(tries=2**31, every_s=0.5)
 AttachOutputs = Callable[[Session], AbstractContextManager[Outputs | None]]
 
@@ -74,8 +75,8 @@ class SessionReader:
             session.stop()
         self._thread.join(STOPPED_S)
         if session is not None and self._thread.is_alive():
-            session.close()  # what it waits for fails
-            self._thread.join(STOPPED_S)
+            session.close()  # what it waits for fails; sinks may still send what is queued
+            self._thread.join(SINKS_S)
 
     def again(self) -> None:
         """Open the device again, where a session is over."""

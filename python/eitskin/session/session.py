@@ -24,7 +24,7 @@ from eitskin.device.open import open_with_files
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.streaming import LEAVE_S, STOP_S, packet_stream
-from eitskin.device.timing import split_timing
+from eitskin.device.timing import check_speed, split_timing
 from eitskin.device.transport import Capabilities
 from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.session.assemble import Assembler, Clock
@@ -96,7 +96,8 @@ class Session:
         self._progress, self._observe = progress, observe
         named = split_timing(url)[1]
         self._loops = named.loop
-        self.pacer = Pacer(speed if named.speed is None else named.speed, clock)
+        chosen = check_speed(speed, "speed") if named.speed is None else named.speed
+        self.pacer = Pacer(chosen, clock)
         self._slowness = Slowness(clock)
         self._reconnect = reconnect
         self.known: KnownModel | None = None

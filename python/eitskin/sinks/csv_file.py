@@ -7,7 +7,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from eitskin.device.recordings.new_file import RecordingFile
+from eitskin.device.recordings.new_file import RecordingFile, WaitingFile
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
 from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource
@@ -29,7 +29,7 @@ COLUMNS = (*HEAD, *TOUCH, "found", "refused", "events", *DRIVE)
 class CsvSink:
     """An open CSV file, written to after each frame."""
 
-    def __init__(self, file: RecordingFile) -> None:
+    def __init__(self, file: WaitingFile) -> None:
         self._file = file
 
     def write(self, outgoing: OutgoingMessage) -> None:
@@ -54,7 +54,7 @@ def _text(rows: list[Any]) -> bytes:
     return text.getvalue().encode()
 
 
-def new_file(url: str, source: TouchSource, first: bytes = b"") -> RecordingFile:
+def new_file(url: str, source: TouchSource, first: bytes = b"") -> WaitingFile:
     """Return a new file for a URL such as ``csv:FILE``, with ``first`` written to it.
 
     Raises:
@@ -70,7 +70,7 @@ def new_file(url: str, source: TouchSource, first: bytes = b"") -> RecordingFile
         raise FileError(
             f"{path}: exists already; name another file, or overwrite it with  --overwrite"
         )
-    return RecordingFile(path, first, overwrite=source.overwrite)
+    return WaitingFile(RecordingFile(path, first, overwrite=source.overwrite))
 
 
 def open_sink(url: str, source: TouchSource) -> Sink:

@@ -56,8 +56,10 @@ class McapSink:
     def close(self) -> None:
         if self._writer is None:
             self._begin(CHUNK_BYTES)
-        self._writer.finish()
-        self._stream.close()
+        try:
+            self._writer.finish()
+        finally:
+            self._stream.close()
 
     def _begin(self, chunk_bytes: int) -> None:
         from mcap_ros2.writer import Writer

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, Protocol
 from urllib.parse import SplitResult, parse_qs, urlsplit
 
+from eitskin.config import plain_whole
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
 from eitskin.session.frame import DriveReport, Frame, Message, Notice
@@ -114,7 +115,7 @@ def setting(url: str, query: str, name: str, low: int, high: int, default: int) 
     """
     try:
         values = parse_qs(query, strict_parsing=True, keep_blank_values=True) if query else {}
-        number = int(values.pop(name, [str(default)])[-1])
+        number = plain_whole(values.pop(name, [str(default)])[-1])
         if values or not low <= number <= high:
             raise ValueError
     except ValueError:

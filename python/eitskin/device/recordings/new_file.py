@@ -5,6 +5,7 @@ import os
 import tempfile
 import threading
 import time
+from collections import deque
 from contextlib import suppress
 from pathlib import Path
 from typing import IO
@@ -13,6 +14,8 @@ from eitskin.errors import FileError
 from eitskin.fileio import followed, locked, replace_by, sync_folder
 
 SYNC_S = 1.0
+MAX_WAITING = 8 << 20  # bytes that wait for room on a full disk
+ENDED = "the disk was full for too long; the file ends there, and can be read"
 
 
 class RecordingFile:
@@ -58,6 +61,7 @@ class RecordingFile:
             raise
 
     def write(self, data: bytes) -> None:
+        """Append ``data`` whole, or nothing of it."""
         try:
             written = self._file.write(data)
         except (OSError, ValueError) as error:
@@ -65,17 +69,22 @@ class RecordingFile:
                 f"{self._path}: cannot go on recording ({error}); what was recorded can be read"
             ) from None
         if written != len(data):
+            with suppress(OSError):  # what is no regular file has no end to cut
+                self._file.truncate(self._file.seek(-written, os.SEEK_CUR))
             raise FileError(
-                f"{self._path}: cannot go on recording (the disk is full); what was recorded can be"
-                " read"
+                f"{self._path}: cannot go on recording (No space left on device); what was recorded"
+                " can be read"
             )
 
-    def tell(self) -> int:
-        """How many bytes are written."""
-        return self._file.tell()
+    @property
+    def path(self) -> Path:
+        return self._path
 
-    def flush(self) -> None:
-        """Nothing is held back; for writers that want to be sure."""
+    def tell_or_zero(self) -> int:
+        """How many bytes are written; 0 where that cannot be asked."""
+        with suppress(OSError):
+            return self._file.tell()
+        return 0
 
     def sync_now_and_then(self) -> None:
         """Once a second, begin to bring what was written to the disk; the caller does not wait."""
@@ -98,3 +107,55 @@ class RecordingFile:
             self._syncing.join()
         self._sync()
         self._file.close()
+
+
+class WaitingFile:
+    """Writes into ``file``; what finds no room waits in memory, ``MAX_WAITING`` bytes at most, and
+    is written in its order as soon as there is room. Each ``write`` is there whole or not at all.
+
+    A ``write`` raises the FileError of a full disk once per time that it is full. When too much
+    waits, the file ends there: every later call raises.
+    """
+
+    def __init__(self, file: RecordingFile) -> None:
+        self._file, self._waiting = file, deque[bytes]()
+        self._told = self._over = False
+        self._size = file.tell_or_zero()
+
+    def write(self, data: bytes) -> int:
+        if self._over:
+            raise FileError(f"{self._file.path}: {ENDED}")
+        self._waiting.append(bytes(data))
+        self._size += len(data)
+        try:
+            self.flush()
+        except FileError:
+            if sum(map(len, self._waiting)) > MAX_WAITING:
+                self._over = True
+                self._waiting.clear()
+                raise FileError(f"{self._file.path}: {ENDED}") from None
+            if not self._told:
+                self._told = True
+                raise
+        return len(data)
+
+    def flush(self) -> None:
+        """Write what waits."""
+        while self._waiting:
+            self._file.write(self._waiting[0])
+            self._waiting.popleft()
+            self._told = False
+
+    def tell(self) -> int:
+        """How many bytes were given."""
+        return self._size
+
+    def sync_now_and_then(self) -> None:
+        self._file.sync_now_and_then()
+
+    def close(self) -> None:
+        """Write what waits, if there is room, and bring everything to the disk."""
+        try:
+            self.flush()
+        finally:
+            self._file.close()

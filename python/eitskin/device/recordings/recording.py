@@ -6,7 +6,7 @@ docs/reference/link-protocol.md, "Recordings", specifies the file.
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,8 @@ LOOKED_THROUGH = 64 * CHUNK  # the note of the solver is among the first packets
 class Recorder:
     """Writes every packet that ``device`` receives to the new file ``path`` until it is closed,
     after the ``options`` that its solver has, so that the host can solve it again. ``packets`` and
-    ``bytes`` count.
+    ``bytes`` count. If writing fails, such as on a full disk, the stream ends with the error; with
+    ``failed`` only the recording ends, and ``failed`` gets the error, in whatever thread.
 
     Raises:
         FileError: the file exists already (with ``overwrite``: is being recorded to), or cannot be
@@ -48,8 +49,10 @@ class Recorder:
         options: Options | None = None,
         *,
         overwrite: bool = False,
+        failed: Callable[[FileError], object] | None = None,
     ) -> None:
         self.path, self._device = Path(path), device
+        self._failed, self._over = failed, False
         self.packets = self.bytes = 0
         info = device.board if device.transport.capabilities.replays else device.info()
         head = {
@@ -88,7 +91,16 @@ class Recorder:
         self._file.close()
 
     def _take(self, packet: Packet) -> None:
-        self._write(packet.type, packet.sequence, packet.payload)
+        if self._over:
+            return
+        try:
+            self._write(packet.type, packet.sequence, packet.payload)
+        except FileError as error:
+            if self._failed is None:
+                raise
+            self._over = True
+            self._failed(error)
+            return
         self.packets += 1
 
     def _write(self, packet_type: int, sequence: int, payload: bytes) -> None:

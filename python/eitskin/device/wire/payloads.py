@@ -3,6 +3,7 @@ them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import astuple
+from math import isfinite
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -99,6 +100,8 @@ def unpack(kind: type[AnyPayload], payload: bytes, what: str, *, more: bool = Fa
     for (name, _, form), count in zip(layout.fields, layout.counts, strict=True):
         found[name] = FORMS[form].read(values[start : start + count])
         start += count
+    if any(isinstance(one, float) and not isfinite(one) for one in values):
+        raise MalformedPacket(f"{what}: a value that is no number")
     return kind(**found)
 
 
@@ -128,13 +131,18 @@ def parse_raw(payload: bytes) -> RawFrame:
 def parse_image(payload: bytes) -> SolvedImage:
     solved = unpack(Solved, payload, "IMAGE", more=True)
     _check_rest(payload, solved, 4 * solved.count, "IMAGE")
-    return SolvedImage(solved, np.frombuffer(payload, dtype="<f4", offset=solved.LAYOUT.size))
+    image = np.frombuffer(payload, dtype="<f4", offset=solved.LAYOUT.size)
+    if not np.isfinite(image).all():
+        raise MalformedPacket("IMAGE: a pixel that is no number")
+    return SolvedImage(solved, image)
 
 
 def parse_touches(payload: bytes) -> SolvedTouches:
     solved, each = unpack(Solved, payload, "TOUCHES", more=True), TouchPacket.LAYOUT
     _check_rest(payload, solved, each.size * solved.count, "TOUCHES")
-    found = each.struct.iter_unpack(payload[solved.LAYOUT.size :])
+    found = list(each.struct.iter_unpack(payload[solved.LAYOUT.size :]))
+    if not all(map(isfinite, (value for one in found for value in one))):
+        raise MalformedPacket("TOUCHES: a value that is no number")
     return SolvedTouches(solved, tuple(map(known_touch, found)))
 
 
@@ -144,10 +152,6 @@ def parse_drive_touches(payload: bytes) -> DriveTouches:
     rest = payload[head.LAYOUT.size :]
     parts = (rest[k : k + each.size] for k in range(0, len(rest), each.size))
     found = tuple(unpack(DriveTouch, part, "DRIVE_TOUCHES") for part in parts)
-    if not np.isfinite([astuple(touch)[2:] for touch in found]).all():
-        raise MalformedPacket(
-            "DRIVE_TOUCHES: a touch whose place, velocity or strength is no number"
-        )
     return DriveTouches(head, found)
 
 
