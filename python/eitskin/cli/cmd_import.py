@@ -10,6 +10,7 @@ from eitskin.cli.printing import answer, say
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import save_frames
 from eitskin.frames.importer import import_frames
+from eitskin.skin.protocol import pattern_name
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -39,6 +40,7 @@ def run(options: argparse.Namespace) -> int:
         "quiet_frames": len(frames.reference_voltage_v),
         "channels": frames.protocol.n_rows,
         "electrodes": frames.protocol.n_electrodes,
+        "pattern": pattern_name(frames.protocol),
         "protocol_hash": f"{frames.protocol.hash:016x}",
         "touches": 0 if frames.touch_frame is None else len(frames.touch_frame),
         "masks": frames.truth_mask is not None,
@@ -52,7 +54,8 @@ def run(options: argparse.Namespace) -> int:
         options,
         facts,
         f"{options.output}: {facts['frames']} frame(s) of {facts['channels']} rows,"
-        f" {facts['quiet_frames']} untouched, {facts['electrodes']} electrodes, {facts['touches']}"
+        f" {facts['quiet_frames']} untouched, {facts['electrodes']} electrodes, {facts['pattern']},"
+        f" {facts['touches']}"
         f" known touches; unit {facts['unit']}",
         f"next: eitskin doctor {options.output}{with_skin}",
     )

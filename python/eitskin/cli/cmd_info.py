@@ -6,6 +6,7 @@ from typing import Any
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import add_device, open_named
 from eitskin.cli.printing import answer, table
+from eitskin.device.check import scanned_pattern
 from eitskin.device.wire.packets import BoardInfo, BoardStats
 from eitskin.model.storage import STORAGES
 
@@ -50,7 +51,7 @@ def _facts(info: BoardInfo, url: str) -> dict[str, Any]:
             f" {info.model_crc:08x}; {info.n_pixels} pixels, rank {info.rank}, {storage}"
         )
         rows = f"{info.n_electrodes} electrodes, {info.n_rows} rows, {info.n_folded} folded"
-        facts["protocol"] = f"{info.protocol_hash:016x}: {rows}"
+        facts["protocol"] = f"{scanned_pattern(info)} ({info.protocol_hash:016x}): {rows}"
     else:
         facts["model"] = "none; upload one with  eitskin model upload MODEL.eitm"
     facts |= _scan(info)

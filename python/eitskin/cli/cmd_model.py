@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from eitskin.cli.arguments import RING_OHM, Output, option
 from eitskin.cli.device_options import DEVICE_HELP
+from eitskin.cli.pattern_options import add_pattern, skin_and_protocol, with_pattern
 from eitskin.cli.printing import answer, print_json
 from eitskin.cli.progress import bar
 from eitskin.core.engine import CoreEngine
@@ -28,8 +29,8 @@ from eitskin.model.eitm import load_model, save_model
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_or_prebuilt
 from eitskin.skin.eidors import read_eidors
-from eitskin.skin.protocol import Protocol, adjacent
-from eitskin.skin.skin import Skin, load_skin, paper_skin, skin_of_eidors
+from eitskin.skin.protocol import Protocol, independent_rows, pattern_name
+from eitskin.skin.skin import Skin, skin_of_eidors
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 
 NUMPY_BOUND = 1e-4
@@ -42,8 +43,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         build, "skin SKIN.toml", "skin description, or a .mat with an EIDORS model", Path, nargs="?"
     )
     option(build, "--paper", "use the paper's 194 mm disk instead of a file")
+    add_pattern(build)
     option(build, "-o --output MODEL.eitm", None, Output, required=True)
-    option(build, "--rank", "rows of the reduced Jacobian (default: 64, or all if fewer)", int)
+    option(
+        build,
+        "--rank",
+        "rows of the reduced Jacobian (default: 64, or all independent rows if fewer)",
+        int,
+    )
     option(build, "--pixels", "number of pixels along the longer side", default=32)
     option(build, "--storage", choices=("f32", "f16", "i16", "i8"), default="f32")
     option(
@@ -83,6 +90,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     option(voltages, "skin SKIN.toml", "skin description", Path, nargs="?")
     option(voltages, "--paper", "use the paper's 194 mm disk instead of a file")
+    add_pattern(voltages)
     option(
         voltages,
         "--resistor-ring OHM",
@@ -122,7 +130,16 @@ def run_build(options: argparse.Namespace) -> int:
     from eitskin.frames.homogeneous_fem import transfer_by_elements
 
     eidors = read_eidors(options.skin) if _is_eidors(options) else None
-    skin, protocol = _skin_of(options) if eidors is None else skin_of_eidors(eidors)
+    if eidors is None:
+        skin, protocol = _skin_of(options)
+    else:
+        skin, own = skin_of_eidors(eidors)
+        protocol = with_pattern(options, own)
+        if protocol.hash != own.hash:
+            raise UsageError(
+                "model build: an EIDORS model has its own Jacobian, for its own pattern; leave out"
+                " --drive and --measure"
+            )
     refuse_unwritable(options.output)
     settings = BuildSettings(
         rank=options.rank or 0,
@@ -152,7 +169,7 @@ def _is_eidors(options: argparse.Namespace) -> bool:
 def _skin_of(options: argparse.Namespace) -> tuple[Skin, Protocol]:
     if (options.skin is None) == (not options.paper):
         raise UsageError(f"model {options.action}: give either a SKIN.toml or --paper")
-    return (paper_skin(), adjacent(16)) if options.paper else load_skin(options.skin)
+    return skin_and_protocol(options, options.skin)
 
 
 def run_voltages(options: argparse.Namespace) -> int:
@@ -194,9 +211,11 @@ def _print_info(model: Model, size: int, name: str, as_json: bool) -> None:
         "made_by": model.meta.get("made_by", "unknown"),
         "skin": model.meta.get("skin", {}).get("skin", {}).get("name", "unknown"),
         "electrodes": model.protocol.n_electrodes,
+        "pattern": pattern_name(model.protocol),
         "protocol_rows": model.protocol.n_rows,
         "protocol_hash": f"{model.protocol.hash:016x}",
         "folded_rows": len(model.fold.first),
+        "independent_rows": independent_rows(model.protocol),
         "rank": model.rank,
         "pixels": model.grid.n_pixels,
         "pixel_mm": round(model.grid.pixel_mm, 4),

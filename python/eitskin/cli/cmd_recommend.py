@@ -5,13 +5,13 @@ import argparse
 from pathlib import Path
 
 from eitskin.cli.arguments import Output, option
+from eitskin.cli.pattern_options import add_pattern, skin_and_protocol
 from eitskin.cli.preset_option import add_preset
 from eitskin.cli.printing import answer
 from eitskin.cli.progress import bar
 from eitskin.errors import UsageError
 from eitskin.fileio import refuse_unwritable
-from eitskin.skin.protocol import adjacent
-from eitskin.skin.skin import load_skin, paper_skin
+from eitskin.skin.protocol import adjacent, pattern_name
 from eitskin.tuning.front import (
     Conditions,
     Preset,
@@ -56,6 +56,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(parser, "--warm", "also allow settings that start each frame from the last image")
     option(parser, "-o --output MODEL.eitm", "build and write the model to use", Output)
     option(parser, "--skin SKIN.toml", "skin of the model (default: the paper's disk)", Path)
+    add_pattern(parser)
     option(parser, "--json")
     parser.set_defaults(run=run)
 
@@ -63,8 +64,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     preset = _read(options)
     refuse_unwritable(options.output)
-    if options.skin is not None and options.output is None:
-        raise UsageError("--skin is for the model; name its file with  -o MODEL.eitm")
+    for name in ("skin", "drive", "measure", "order"):
+        if getattr(options, name) is not None and options.output is None:
+            raise UsageError(f"--{name} is for the model; name its file with  -o MODEL.eitm")
     front = load_front(options.front)
     usable = [one for one in front.points if options.warm or not one.configuration.warm_start]
     point = choose(usable, preset)
@@ -72,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     facts, lines = chosen.as_dict() | {"front": front.where_from, "model": None}, [chosen.text()]
     if options.output is not None:
         named = options.skin
-        skin, protocol = (paper_skin(), adjacent(16)) if named is None else load_skin(named)
+        skin, protocol = skin_and_protocol(options, named)
         size = write_model(options.output, point, skin, protocol, bar("random skins"))
         facts["model"] = str(options.output)
         lines.append(
@@ -82,6 +84,11 @@ def run(options: argparse.Namespace) -> int:
         if named is not None:
             lines.append(
                 "the numbers were measured on the paper's skin; on another they may differ"
+            )
+        if protocol.hash != adjacent(protocol.n_electrodes).hash:
+            lines.append(
+                f"the numbers were measured with the adjacent pattern; with"
+                f" {pattern_name(protocol)} they may differ"
             )
     return answer(options, facts, *lines)
 

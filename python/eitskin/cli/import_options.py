@@ -12,7 +12,7 @@ from eitskin.frames.importer import accepted_counts
 from eitskin.frames.layout import Layout, layout_of, load_layout, save_layout
 from eitskin.frames.source import SourceOptions, read_source
 from eitskin.frames.truth import TruthOptions
-from eitskin.skin.protocol import Protocol, adjacent, opposite, skip
+from eitskin.skin.protocol import PATTERNS_HELP, Protocol, pattern
 from eitskin.skin.skin import Skin, load_skin
 
 PAIRS = ("real-imag", "magnitude-degrees", "magnitude-radians")
@@ -46,6 +46,8 @@ def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | 
         )
     if options.skip is not None and options.protocol != "skip":
         raise UsageError("--skip goes with --protocol skip")
+    if options.measure is not None and options.protocol in (None, "table"):
+        raise UsageError("--measure goes with --protocol PATTERN")
     layout = read_layout(options)
     if layout is not None and layout.protocol is not None and options.protocol is None:
         if protocol is None:
@@ -59,13 +61,12 @@ def read_protocol(options: argparse.Namespace) -> tuple[Protocol | None, Skin | 
         return protocol, skin, count
     if count is None:
         raise UsageError(f"--protocol {options.protocol} needs --electrodes N or --skin FILE")
-    if options.protocol == "skip":
+    drive = options.protocol
+    if drive == "skip":
         if options.skip is None:
-            raise UsageError("--protocol skip needs --skip K")
-        protocol = skip(count, options.skip)
-    else:
-        protocol = {"adjacent": adjacent, "opposite": opposite}[options.protocol](count)
-    return protocol, skin, count
+            raise UsageError("--protocol skip needs --skip K; or name it --protocol skip-K")
+        drive = f"skip-{options.skip}"
+    return pattern(count, drive, options.measure), skin, count
 
 
 def read_options(options: argparse.Namespace) -> ImportOptions:
@@ -169,9 +170,13 @@ def _add_protocol(group: Any) -> None:
     option(group, "--skin FILE", "skin description (TOML) with its protocol", Path)
     option(
         group,
-        "--protocol",
-        "table: keep the source's own table",
-        choices=("adjacent", "opposite", "skip", "table"),
+        "--protocol PATTERN",
+        f"pattern of the pairs: {PATTERNS_HELP}; or table: keep the source's own table",
+    )
+    option(
+        group,
+        "--measure PATTERN",
+        "pairs that measure (default: as they drive; adjacent if those are opposite)",
     )
     option(group, "--skip K", "electrodes to skip, with --protocol skip", int)
     option(group, "--electrodes N", "number of electrodes, if no skin is given", int)

@@ -13,6 +13,9 @@ from eitskin.errors import DeviceError
 from eitskin.model.eitm import load_model
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.skin.protocol import Protocol, pattern, pattern_name, pattern_names
+
+MIXED_ELECTRODES = 32  # up to so many, drive and measuring patterns that differ are tried too
 
 FLASH = "flash this version's firmware with  eitskin flash"
 
@@ -70,6 +73,25 @@ def no_answer(link: Link, before: LinkCounters, what: str, waited_s: float) -> s
     )
 
 
+def scanned(info: BoardInfo) -> Protocol | None:
+    """Return the pattern's protocol that has the hash of the board's, or None."""
+    names = pattern_names(info.n_electrodes)
+    named: list[tuple[str, str | None]] = [(name, None) for name in names]
+    if info.n_electrodes <= MIXED_ELECTRODES:
+        named += [(drive, measure) for drive in names for measure in names]
+    for drive, measure in named:
+        made = pattern(info.n_electrodes, drive, measure)
+        if made.n_rows == info.n_rows and made.hash == info.protocol_hash:
+            return made
+    return None
+
+
+def scanned_pattern(info: BoardInfo) -> str:
+    """Return the name of the pattern that the board scans, or that it is a table."""
+    made = scanned(info)
+    return f"a table of {info.n_rows} rows" if made is None else pattern_name(made)
+
+
 def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
     """Refuse to read a board's frames with another model than it scans and solves with."""
     if not info.has_model:
@@ -78,9 +100,10 @@ def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
         )
     if info.protocol_hash != model.protocol.hash:
         raise DeviceError(
-            f"{name}: the board scans protocol {info.protocol_hash:016x} ({info.n_electrodes}"
-            f" electrodes, {info.n_rows} rows) and the model here {model.protocol.hash:016x}"
-            f" ({model.protocol.n_electrodes} electrodes, {model.protocol.n_rows} rows); put yours"
+            f"{name}: the board scans {scanned_pattern(info)} (protocol"
+            f" {info.protocol_hash:016x}, {info.n_electrodes} electrodes, {info.n_rows} rows) and"
+            f" the model here {pattern_name(model.protocol)} ({model.protocol.hash:016x},"
+            f" {model.protocol.n_electrodes} electrodes, {model.protocol.n_rows} rows); put yours"
             " on the board with  eitskin model upload FILE  or name the board's with  --model FILE"
         )
     if info.model_crc != zlib.crc32(blob):

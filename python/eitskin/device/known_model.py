@@ -2,20 +2,17 @@
 electrodes."""
 
 import zlib
-from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 from eitskin.core.results import Options
-from eitskin.device.check import model_of
+from eitskin.device.check import model_of, scanned
 from eitskin.device.wire.packets import BoardInfo
-from eitskin.errors import DeviceError, ProtocolError
+from eitskin.errors import DeviceError
 from eitskin.model.model import Model
 from eitskin.model.options import default_options, tracking
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.skin.protocol import Protocol, adjacent, opposite, skip
+from eitskin.skin.protocol import Protocol
 
 NAMES_IT = "name its file with  --model FILE"
 
@@ -59,25 +56,17 @@ def need_model(info: BoardInfo, path: Path | None, name: str, what: str) -> Know
 
 
 def scanned_protocol(info: BoardInfo, known: KnownModel | None, name: str) -> Protocol:
-    """The protocol that a board scans: its model's, or the usual one that has the same hash."""
+    """The protocol that a board scans: its model's, or that of the pattern that has the same
+    hash."""
     if known is not None:
         return known.model.protocol
-    for protocol in _usual(info.n_electrodes):
-        if protocol.hash == info.protocol_hash:
-            return protocol
+    protocol = scanned(info)
+    if protocol is not None:
+        return protocol
     raise DeviceError(
         f"{name}: which rows the board scans (protocol {info.protocol_hash:016x}) only its model"
         f" tells; {NAMES_IT}"
     )
-
-
-def _usual(electrodes: int) -> Iterator[Protocol]:
-    """Adjacent, opposite and skip-n, as far as there are such for so many ``electrodes``."""
-    skips = [partial(skip, skip=k) for k in range(1, (electrodes - 1) // 2)]
-    makers: list[Callable[[int], Protocol]] = [adjacent, opposite, *skips]
-    for make in makers:
-        with suppress(ProtocolError):
-            yield make(electrodes)
 
 
 def board_options(model: Model, board: BoardInfo | None = None, *, track: bool = True) -> Options:

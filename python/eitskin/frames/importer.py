@@ -31,7 +31,7 @@ from eitskin.frames.source import (
 )
 from eitskin.frames.tables import read_table
 from eitskin.frames.truth import TruthOptions, truth_fields
-from eitskin.skin.protocol import Protocol, table
+from eitskin.skin.protocol import Protocol, pattern_name, table
 from eitskin.skin.skin import Skin
 
 ASSUMED_UNTOUCHED = "no untouched frames were named; the first frame is used as one"
@@ -139,7 +139,9 @@ def _read(
 def _check_protocol(path: str | Path, frames: Frames, protocol: Protocol | None) -> None:
     if protocol is not None and protocol.hash != frames.protocol.hash:
         raise ProtocolError(
-            f"{path}: was made with another protocol than the one given; leave those options out"
+            f"{path}: was made with another protocol, {pattern_name(frames.protocol)} of"
+            f" {frames.protocol.n_electrodes} electrodes, than the {pattern_name(protocol)} of"
+            f" {protocol.n_electrodes} that was given; leave those options out"
         )
 
 
@@ -160,7 +162,7 @@ def accepted_counts(
         return (len(rows),), f"the table {options.table_file}"
     if protocol is None:
         raise UsageError(
-            "say which protocol: --skin FILE, --protocol KIND --electrodes N, or a table"
+            "say which protocol: --skin FILE, --protocol PATTERN --electrodes N, or a table"
         )
     if options.order == "table":
         raise UsageError(

@@ -44,7 +44,7 @@ def source_rows(
     if given is None:
         if protocol is None:
             raise UsageError(
-                "say which protocol: --skin FILE, --protocol KIND --electrodes N, or a table"
+                "say which protocol: --skin FILE, --protocol PATTERN --electrodes N, or a table"
             )
         given = source_table(options.order, protocol)
     elif given.min(initial=0) < 0 or given.max(initial=0) >= n:

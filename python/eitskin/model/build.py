@@ -27,7 +27,7 @@ from eitskin.model.row_form import row_form
 from eitskin.model.storage import STORAGES, store
 from eitskin.progress import Progress, silent
 from eitskin.skin.mirror import rim_mirror
-from eitskin.skin.protocol import Protocol, protocol_to_table
+from eitskin.skin.protocol import Protocol, protocol_to_table, require_independent
 from eitskin.skin.skin import Skin, size_to_paper, skin_to_table
 from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY, Uncertainty
 
@@ -46,9 +46,9 @@ ERROR_ELEMENTS = 6000
 
 @dataclass(frozen=True)
 class BuildSettings:
-    """The settings for building a model. ``rank`` 0 takes the number of folded rows, at most 64.
-    ``samples`` is the number of random skins that are drawn for the model errors: 0 draws none, and
-    None takes the number from the skin's uncertainty."""
+    """The settings for building a model. ``rank`` 0 takes the number of independent rows, at most
+    64. ``samples`` is the number of random skins that are drawn for the model errors: 0 draws none,
+    and None takes the number from the skin's uncertainty."""
 
     rank: int = 0
     pixels_across: int = 32
@@ -112,7 +112,8 @@ def make_model(
         # too.
         silent = np.abs(v_ref) < MIN_RATIO_REFERENCE * np.sqrt(np.mean(v_ref**2))
         jacobian = np.where(silent[:, None], 0.0, jacobian / np.where(silent, 1.0, v_ref)[:, None])
-    rank = settings.rank or min(64, *jacobian.shape)
+    independent = require_independent(protocol, min(settings.rank, len(fold.first)))
+    rank = settings.rank or min(64, independent, *jacobian.shape)
     reduction = reduce_jacobian(
         jacobian, rank, regularisation=settings.regularisation, column_power=settings.column_power
     )

@@ -7,8 +7,12 @@ voltage; swapping the electrodes of a pair flips the sign.
 Consecutive rows with the same driving pair form a drive. Drives are measured in the order of
 ``drive_order``, and the rows within a drive as listed. The order changes when a row is measured,
 but not its place in a frame.
+
+A pattern names how far apart the electrodes of a pair are: adjacent pairs are (e, e + 1), skip-n
+pairs (e, e + n + 1), opposite pairs (e, e + half the electrodes).
 """
 
+import re
 import struct
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -25,7 +29,11 @@ from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 
 TableArray = npt.NDArray[np.uint8]
 
-KINDS = ("adjacent", "opposite", "skip", "table")
+KINDS = ("adjacent", "skip-N", "opposite", "skip", "table")
+PATTERNS_HELP = "adjacent, skip-1, skip-2, ..., or opposite"
+SKIP = re.compile(r"skip-(-?\d{1,3})")
+MIN_INDEPENDENT = 3  # rows: the place and the strength of one touch
+MAX_GRAM_ROWS = 3000  # folded rows whose independence is computed, within a few seconds
 DEFAULT_CURRENT_A = 1e-3
 MAX_ROWS = 0xFFFF
 
@@ -157,11 +165,7 @@ def opposite(n: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
     Raises:
         ProtocolError: ``n`` is odd, below 6 or out of range.
     """
-    if n % 2 or n < 6:
-        raise ProtocolError(
-            f"protocol: opposite drive needs an even number of at least 6 electrodes, not {n}"
-        )
-    return Protocol(n, _drive_and_measure(n, n // 2, 1), current_a)
+    return pattern(n, "opposite", current_a=current_a)
 
 
 def skip(n: int, skip: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
@@ -172,16 +176,109 @@ def skip(n: int, skip: int, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
         ProtocolError: ``n`` is out of range, or the pair does not span less than half the
             electrodes.
     """
+    return pattern(n, f"skip-{skip}", current_a=current_a)
+
+
+def pattern(
+    n: int, drive: str, measure: str | None = None, current_a: float = DEFAULT_CURRENT_A
+) -> Protocol:
+    """Return the protocol that drives pairs of the pattern ``drive`` and measures those of
+    ``measure``, both ascending from electrode 0, without rows that measure at a driven electrode.
+
+    Without ``measure`` skip patterns measure as they drive, and opposite drives are measured with
+    adjacent pairs. An opposite pair stands in the table in both directions; if both patterns are
+    opposite, only in one, as more than two rows would hold the same voltage.
+
+    Raises:
+        ProtocolError: ``n`` is out of range, a pattern is not known or not possible for ``n``
+            electrodes, or no row is left.
+    """
     if not MIN_COUNT <= n <= MAX_COUNT:
         raise ProtocolError(
             f"protocol: {n} electrodes is out of range; use {MIN_COUNT} to {MAX_COUNT}"
         )
-    if not 0 <= 2 * (1 + skip) - 1 < n - 1:
+    spans = [_span(name, n) for name in (drive, measure or _measured_with(drive))]
+    pairs = n // 2 if spans == [n // 2, n // 2] and n % 2 == 0 else n
+    rows = _drive_and_measure(n, *spans, pairs)
+    if not len(rows):
         raise ProtocolError(
-            f"protocol: skip = {skip} is out of range for {n} electrodes; use 0 to"
-            f" {(n - 1) // 2 - 1}"
+            f"protocol: {drive} drives of {n} electrodes leave no {measure or drive} pair without"
+            " a driven electrode; use another pattern or more electrodes"
         )
-    return Protocol(n, _drive_and_measure(n, 1 + skip, 1 + skip), current_a)
+    return Protocol(n, rows, current_a)
+
+
+def pattern_names(n: int) -> tuple[str, ...]:
+    """Return the patterns that are possible for ``n`` electrodes, narrow pairs first."""
+    skips = tuple(f"skip-{k}" for k in range(1, (n - 1) // 2))
+    return ("adjacent", *skips, *(("opposite",) if n % 2 == 0 and n >= 6 else ()))
+
+
+def pattern_name(protocol: Protocol) -> str:
+    """Return the name of the protocol's pattern: "skip-3", or "skip-3/adjacent" for drive and
+    measurement, or a description of its table if no pattern has these rows."""
+    n, rows = protocol.n_electrodes, protocol.drive_measure.astype(np.int64)
+    spans = [set(((rows[:, k + 1] - rows[:, k]) % n).tolist()) for k in (0, 2)]
+    names = [_name_of(span.pop(), n) if len(span) == 1 else None for span in spans]
+    if names[0] is not None and names[1] is not None:
+        name = names[0] if names[1] == _measured_with(names[0]) else f"{names[0]}/{names[1]}"
+        try:
+            made = pattern(n, names[0], names[1])
+        except ProtocolError:
+            return f"a table of {len(rows)} rows"
+        if np.array_equal(made.drive_measure, rows):
+            return name
+        unique = made.drive_measure[made.reciprocal_pairs().first]
+        if np.array_equal(unique, rows):
+            return f"{name}, one row of each reciprocal pair"
+    return f"a table of {len(rows)} rows"
+
+
+def independent_rows(protocol: Protocol) -> int:
+    """Return how many rows no linear combination of the others replaces, whatever the skin.
+
+    The voltages of a reciprocal skin are a symmetric form of drive and measuring pair, so this is
+    the rank of the symmetrised products of the two. Above ``MAX_GRAM_ROWS`` folded rows it is not
+    computed, and the bound min(folded rows, n (n - 1) / 2) is returned.
+    """
+    n, first = protocol.n_electrodes, protocol.reciprocal_pairs().first
+    most = min(len(first), n * (n - 1) // 2)
+    if len(first) > MAX_GRAM_ROWS:
+        return most
+    rows, k = protocol.drive_measure[first].astype(np.int64), np.arange(len(first))
+    pairs = np.zeros((2, len(first), n))
+    for one, columns in zip(pairs, (rows[:, :2], rows[:, 2:]), strict=True):
+        one[k, columns[:, 0]], one[k, columns[:, 1]] = 1.0, -1.0
+    drive, measure = pairs
+    crossed = drive @ measure.T
+    gram = (drive @ drive.T) * (measure @ measure.T) + crossed * crossed.T
+    values = np.linalg.eigvalsh(gram)
+    return min(most, int((values > 1e-9 * values[-1]).sum()))
+
+
+def require_independent(protocol: Protocol, rank: int) -> int:
+    """Return ``independent_rows`` if they are enough for ``rank`` (0: for one touch).
+
+    Raises:
+        ProtocolError: they are not; the error says why, and which patterns have more.
+    """
+    independent = independent_rows(protocol)
+    if independent >= max(rank, MIN_INDEPENDENT):
+        return independent
+    folded, n = len(protocol.reciprocal_pairs().first), protocol.n_electrodes
+    asked = f"rank {rank} is more than" if rank > independent else "one touch needs more than"
+    full = [
+        name
+        for name in pattern_names(n)
+        if name != "opposite" and gcd(_span(name, n), n) == 1 and n * (n - 3) // 2 > independent
+    ]
+    remedy = [f"a rank up to {independent}"] if independent >= MIN_INDEPENDENT else []
+    remedy += [f"{', '.join(full)} ({n * (n - 3) // 2})"] if full else ["more electrodes"]
+    raise ProtocolError(
+        f"protocol: {asked} the {independent} independent rows of {pattern_name(protocol)} on {n}"
+        f" electrodes; {protocol.n_rows} rows are {folded} when reciprocal ones are folded, and"
+        f" {independent} when sums of others are left out; use {' or '.join(remedy)}"
+    )
 
 
 def table(n: int, rows: npt.ArrayLike, current_a: float = DEFAULT_CURRENT_A) -> Protocol:
@@ -225,28 +322,36 @@ def in_order(protocol: Protocol, order: str | Iterable[int]) -> Protocol:
 def protocol_from_table(toml_table: Mapping[str, Any], n_electrodes: int, where: str) -> Protocol:
     """Return the protocol in a parsed TOML table; ``where`` names its source in errors. An empty
     table gives the adjacent protocol."""
-    check_keys(toml_table, ("kind", "skip", "table", "current_a", "order"), where)
-    kind = choice(toml_table, "kind", "adjacent", KINDS, where)
+    check_keys(toml_table, ("kind", "measure", "skip", "table", "current_a", "order"), where)
+    kind, measure = (_pattern_word(toml_table, key, where) for key in ("kind", "measure"))
+    kind = kind or "adjacent"
     for key in ("skip", "table"):
         if key in toml_table and kind != key:
             raise ConfigError(f'{where}: {key} goes with kind = "{key}", but kind is "{kind}"')
+    if measure is not None and kind == "table":
+        raise ConfigError(f'{where}: measure goes with a pattern, but kind is "table"')
     current_a = number(
         toml_table, "current_a", DEFAULT_CURRENT_A, where, low=0, high=1, open_low=True
     )
     try:
-        if kind == "adjacent":
-            made = adjacent(n_electrodes, current_a)
-        elif kind == "opposite":
-            made = opposite(n_electrodes, current_a)
-        elif kind == "skip":
-            skipped = integer(toml_table, "skip", None, where, low=0, high=MAX_COUNT)
-            made = skip(n_electrodes, skipped, current_a)
-        else:
+        if kind == "table":
             made = table(n_electrodes, _rows_of_table(toml_table, where), current_a)
+        else:
+            if kind == "skip":
+                kind = f"skip-{integer(toml_table, 'skip', None, where, low=0, high=MAX_COUNT)}"
+            made = pattern(n_electrodes, kind, measure, current_a)
         order = toml_table.get("order")
         return made if order is None else in_order(made, _checked_order(order, where))
     except ProtocolError as error:
         raise ProtocolError(f"{where}: {error}") from None
+
+
+def _pattern_word(toml_table: Mapping[str, Any], key: str, where: str) -> str | None:
+    word = toml_table.get(key)
+    if isinstance(word, str) and SKIP.fullmatch(word):
+        return word
+    names = KINDS if key == "kind" else KINDS[:3]
+    return choice(toml_table, key, None, names, where) if word is not None else None
 
 
 def _checked_order(order: Any, where: str) -> str | list[int]:
@@ -277,11 +382,43 @@ def _named(n: int) -> Iterable[tuple[dict[str, Any], Protocol]]:
         yield {"kind": "skip", "skip": skipped}, skip(n, skipped)
 
 
-def _drive_and_measure(n: int, drive_step: int, measure_step: int) -> TableArray:
-    k = np.arange(n)
+def _measured_with(drive: str) -> str:
+    """Return the pattern with which drives are measured if none is named."""
+    return "adjacent" if drive == "opposite" else drive
+
+
+def _span(name: str, n: int) -> int:
+    """Return by how many electrodes the second of a pair is further than the first."""
+    if name == "opposite":
+        if n % 2 or n < 6:
+            raise ProtocolError(
+                f"protocol: opposite pairs need an even number of at least 6 electrodes, not {n}"
+            )
+        return n // 2
+    word = SKIP.fullmatch("skip-0" if name == "adjacent" else name)
+    if word is None:
+        raise ProtocolError(f'protocol: pattern "{name}" is not known; use {PATTERNS_HELP}')
+    skipped = int(word[1])
+    if skipped < 0 or 2 * (1 + skipped) >= n:
+        opposite = "; pairs of half the electrodes are opposite" if 2 * (1 + skipped) == n else ""
+        raise ProtocolError(
+            f"protocol: skip-{skipped} is out of range for {n} electrodes; use skip-0 (adjacent) to"
+            f" skip-{(n - 1) // 2 - 1}{opposite}"
+        )
+    return 1 + skipped
+
+
+def _name_of(span: int, n: int) -> str | None:
+    if 2 * span >= n:
+        return "opposite" if 2 * span == n and n >= 6 else None
+    return "adjacent" if span == 1 else f"skip-{span - 1}"
+
+
+def _drive_and_measure(n: int, drive_step: int, measure_step: int, pairs: int) -> TableArray:
+    k = np.arange(pairs)
     drive = np.column_stack([k, (k + drive_step) % n])
     measure = np.column_stack([k, (k + measure_step) % n])
-    rows = np.column_stack([np.repeat(drive, n, axis=0), np.tile(measure, (n, 1))])
+    rows = np.column_stack([np.repeat(drive, pairs, axis=0), np.tile(measure, (pairs, 1))])
     apart = (rows[:, :2, None] != rows[:, None, 2:]).all(axis=(1, 2))
     return np.asarray(rows[apart], dtype=np.uint8)
 

@@ -25,7 +25,7 @@ from eitskin.model.eitm import decode_model, encode_model, load_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin.oracle.engine import OracleEngine
-from eitskin.skin.protocol import Protocol
+from eitskin.skin.protocol import Protocol, pattern_name
 from eitskin.threads import OneReader, OneThreadAtATime
 
 ENGINES = ("c", "c64", "numpy")
@@ -126,10 +126,11 @@ class Reconstructor:
         if protocol.hash != self.model.protocol.hash:
             own = self.model.protocol
             raise ProtocolError(
-                f"frames scanned with protocol {protocol.hash:016x} ({protocol.n_electrodes}"
-                f" electrodes, {protocol.n_rows} rows) do not match the model's {own.hash:016x}"
-                f" ({own.n_electrodes} electrodes, {own.n_rows} rows); import the frames in the"
-                " model's order, or build a model with their protocol"
+                f"frames scanned with {pattern_name(protocol)} (protocol {protocol.hash:016x},"
+                f" {protocol.n_electrodes} electrodes, {protocol.n_rows} rows) do not match the"
+                f" model's {pattern_name(own)} ({own.hash:016x}, {own.n_electrodes} electrodes,"
+                f" {own.n_rows} rows); import the frames in the model's order, or build a model"
+                " with their protocol"
             )
 
     def tare(self, untouched_v: npt.ArrayLike) -> LearnedReference:

@@ -10,7 +10,7 @@ import numpy as np
 from eitskin.arrays import FloatArray
 from eitskin.errors import FileError, FrameError
 from eitskin.fileio import followed, locked, write_beside
-from eitskin.skin.protocol import Protocol
+from eitskin.skin.protocol import Protocol, pattern_name
 from eitskin.teaching.plan import PressPlan
 from eitskin.teaching.presses import Presses, joined, load_presses, write_presses
 
@@ -64,7 +64,10 @@ class PressFile:
         if self.presses is None:
             return
         if self.presses.protocol.hash != protocol.hash:
-            raise FrameError(f"{path}: made with another protocol; give another -o, or --overwrite")
+            raise FrameError(
+                f"{path}: made with another protocol, {pattern_name(self.presses.protocol)}, not"
+                f" with {pattern_name(protocol)}; give another -o, or --overwrite"
+            )
         for place in self.presses.place_mm:
             away = np.linalg.norm(plan.place_mm - place, axis=1)
             self.numbers.append(int(np.argmin(away)))

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from eitskin.errors import FrameError, ProtocolError
 from eitskin.model.model import Model
-from eitskin.skin.protocol import Protocol
+from eitskin.skin.protocol import Protocol, pattern_name
 from eitskin.teaching.fit import whitening_of
 from eitskin.teaching.known import known_of
 
@@ -51,8 +51,8 @@ def still_fits(
     known = known_of(model, where)
     if model.protocol.hash != protocol.hash:
         raise ProtocolError(
-            f"{where}: taught with another protocol than that of the frames; give the model of"
-            " this skin"
+            f"{where}: taught with {pattern_name(model.protocol)}, but the frames are of"
+            f" {pattern_name(protocol)}; give the model of this skin"
         )
     frames = np.atleast_2d(np.asarray(untouched, dtype=np.float64))
     frames = frames[np.isfinite(frames).all(axis=1)]

@@ -23,6 +23,7 @@ from eitskin.fem.grid import between_pixels, grid_for
 from eitskin.model.force_law import ForceLaw
 from eitskin.model.model import Model
 from eitskin.progress import Progress, silent
+from eitskin.skin.protocol import pattern_name
 from eitskin.skin.skin import Skin, skin_to_table
 from eitskin.teaching.checks import check_presses
 from eitskin.teaching.explained import (
@@ -122,9 +123,10 @@ def update(
     old = known_of(model, where)
     if model.protocol.hash != presses.protocol.hash:
         raise ProtocolError(
-            f"{where}: taught with {model.protocol.n_rows} rows of another protocol than the"
-            f" presses' {presses.protocol.n_rows}; give the model of this skin, or  eitskin teach"
-            " fit  a new one"
+            f"{where}: taught with {model.protocol.n_rows} rows of"
+            f" {pattern_name(model.protocol)}, another protocol than the presses'"
+            f" {presses.protocol.n_rows} of {pattern_name(presses.protocol)}; give the model of"
+            " this skin, or  eitskin teach fit  a new one"
         )
     skin = model.skin if "skin" in model.meta else None
     check_presses(presses, skin)

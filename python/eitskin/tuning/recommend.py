@@ -1,14 +1,14 @@
 """Prepare a chosen operating point for use: a model that holds its settings, and command-line
 options for the rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from eitskin.model.build import build_model
 from eitskin.model.eitm import save_model
 from eitskin.progress import Progress, silent
-from eitskin.skin.protocol import Protocol
+from eitskin.skin.protocol import Protocol, independent_rows
 from eitskin.skin.skin import Skin
 from eitskin.tuning.configuration import build_settings
 from eitskin.tuning.front import REPORT_US, OperatingPoint, Preset
@@ -142,6 +142,8 @@ def write_model(
     path: Path, point: OperatingPoint, skin: Skin, protocol: Protocol, progress: Progress = silent
 ) -> int:
     """Build and write the model of a point for ``skin``, with the solver's settings and the mask
-    threshold as its defaults; return its size in bytes. ``progress`` is as in ``build_model``."""
+    threshold as its defaults; return its size in bytes. The rank is at most the number of
+    independent rows of ``protocol``. ``progress`` is as in ``build_model``."""
     settings = build_settings(point.configuration, skin, point.threshold)
+    settings = replace(settings, rank=min(settings.rank, independent_rows(protocol)))
     return save_model(path, build_model(skin, protocol, settings, progress=progress))

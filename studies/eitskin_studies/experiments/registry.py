@@ -22,6 +22,10 @@ EXPERIMENTS = {
         "the 208-value waveform of an untouched skin, and what the doctor reads from it (Fig. 4b)"
     ),
     "electrodes": "16, 32 and 64 electrodes and skip patterns, at equal noise and at equal time",
+    "patterns": (
+        "drive patterns on 16 electrodes, where noise comes in volts, from the converter, or both,"
+        " with one gain or a gain per row"
+    ),
     "shapes": "a rounded rectangle, a forearm and a hand outline",
     "tank": "measured frames of water tanks, every method, plain and normalised difference",
     "other-worlds": (

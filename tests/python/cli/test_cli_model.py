@@ -36,8 +36,8 @@ OUTLINES = {
     "clockwise L": "polygon_mm = [[0, 100], [40, 100], [40, 40], [100, 40], [100, 0], [0, 0]]",
 }
 FACTS = (
-    "model", "bytes", "made_by", "skin", "electrodes", "protocol_rows", "protocol_hash",
-    "folded_rows", "rank", "pixels",
+    "model", "bytes", "made_by", "skin", "electrodes", "pattern", "protocol_rows", "protocol_hash",
+    "folded_rows", "independent_rows", "rank", "pixels",
     "pixel_mm", "storage", "data", "lipschitz", "mesh_elements", "calibration", "model_errors",
     "defaults",
 )  # fmt: skip

@@ -50,7 +50,7 @@ def simulated_presses(count: int) -> Presses:
 def test_a_taught_model_is_uploaded_and_streamed(image, tmp_path):
     protocol = opposite(8)
     linear = linearise(SKIN, protocol, pixels_across=14, elements=900)
-    physics = encode_model(make_model(SKIN, protocol, linear, BuildSettings(rank=16, samples=0)))
+    physics = encode_model(make_model(SKIN, protocol, linear, BuildSettings(rank=14, samples=0)))
     taught = teach(simulated_presses(12), SKIN).model
     blob = encode_model(taught)
     (tmp_path / "skin.toml").write_text(EIGHT_OPPOSITE_TOML, encoding="utf-8")

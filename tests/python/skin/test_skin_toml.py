@@ -202,7 +202,7 @@ REFUSED: dict[type[EitskinError], dict[str, str]] = {
         DISK + "[electrodes]\npositions_mm = [1, 2]\n": "2 entries for 16",
     },
     ProtocolError: {
-        DISK + "[protocol]\nkind = 'skip'\nskip = 9\n": r"\[protocol\].*use 0 to 6",
+        DISK + "[protocol]\nkind = 'skip'\nskip = 9\n": r"\[protocol\].*to skip-6",
         DISK + "[protocol]\nkind = 'table'\ntable = [[0, 1, 2, 16]]\n": "0 to 15",
     },
 }

@@ -13,6 +13,7 @@ from eitskin.frames.doctor.noise import check_noise
 from eitskin.frames.doctor.numbering import check_numbering
 from eitskin.frames.doctor.order import check_flips, check_frames, check_sign, choose_order
 from eitskin.frames.doctor.orientation import check_orientation
+from eitskin.frames.doctor.pattern import check_pattern
 from eitskin.frames.doctor.reciprocity import check_reciprocity
 from eitskin.frames.doctor.remedy import combined_remedy, names_numbers
 from eitskin.frames.doctor.report import CheckOutcome, DoctorReport
@@ -47,6 +48,10 @@ def examine_case(subject: Subject) -> tuple[DoctorReport, Case]:
     if finite.findings and finite.findings[-1].name == "no-signal":
         return _report(subject, cases[0], outcomes), cases[0]
     chosen = choose_order(orders, tuple(cases), subject.given)
+    pattern = check_pattern(cases[0], chosen)
+    if pattern.findings:
+        outcomes += [pattern, check_noise(cases[0])]
+        return _report(subject, cases[0], outcomes), cases[0]
     case, numbering = check_numbering(cases[chosen.best])
     case, swaps = check_swaps(case)
     outcomes += [chosen.outcome, replace(numbering, inconclusive=()), swaps, check_frames(case)]

@@ -20,10 +20,12 @@ UNLIKE = 0.5
 
 @dataclass(frozen=True)
 class OrderChoice:
-    """The order whose magnitudes follow the prediction best, and the outcome for the report."""
+    """The order whose magnitudes follow the prediction best, its correlation ``likeness``, and the
+    outcome for the report."""
 
     best: int
     outcome: CheckOutcome
+    likeness: float = 1.0
 
 
 def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -> OrderChoice:
@@ -51,7 +53,7 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
     }
     measured: dict[str, Any] = {"order_correlation": evidence}
     if own >= 0 and (best == own or reached[best] < max(reached[own] + BETTER_BY, LIKELY)):
-        return OrderChoice(own, CheckOutcome(measured=measured))
+        return OrderChoice(own, CheckOutcome(measured=measured), max(reached))
     why = "by their number" if own < 0 else "by correlation with the homogeneous frame"
     named = "the order given" if given == AS_GIVEN else f"{given}"
     finding = Finding(
@@ -61,7 +63,7 @@ def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -
         {"correlation": evidence},
         f"--order {orders[best]}",
     )
-    return OrderChoice(best, CheckOutcome((finding,), measured=measured))
+    return OrderChoice(best, CheckOutcome((finding,), measured=measured), max(reached))
 
 
 def check_frames(case: Case) -> CheckOutcome:

@@ -1,6 +1,5 @@
 """Each constant of the core halved and doubled: what changes on judging scenes."""
 
-import subprocess
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -20,6 +19,7 @@ from eitskin_studies.experiments.constants.tables import (
 )
 from eitskin_studies.experiments.constants.variant import build_variant
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
+from eitskin_studies.harness.commit import last_commit
 
 TITLE = "Constants halved and doubled, one at a time"
 
@@ -53,7 +53,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         {"study": "constants", "tests of": [one.name for one in still]},
         lambda: protecting(Tests(workspace.folder / "tests"), still),
     )
-    commit = _commit()
+    commit = last_commit(("csrc", "tables/constants.toml"))
     facts = {"commit": commit, "seconds": round(seconds), "scenes": len(scenes)}
     return ExperimentOutcome(
         tables_of(variant.constants, effects, needed, commit),
@@ -89,15 +89,3 @@ def _timed(make: Any) -> dict[str, Any]:
     before = used()
     effects: Sequence[Effect] = make()
     return {"effects": [asdict(one) for one in effects], "seconds": used() - before}
-
-
-def _commit() -> str:
-    """The last one that changed the core or the table."""
-    core = ("--", "csrc", "tables/constants.toml")
-    changed = _git("status", "--porcelain", *core)
-    return (_git("log", "-1", "--format=%h", *core) or "unknown") + ("-dirty" if changed else "")
-
-
-def _git(*words: str) -> str:
-    command = ["git", "-C", str(checkout_root()), *words]
-    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
