@@ -21,7 +21,7 @@ Filling: TypeAlias = tuple[dict[str, str], dict[str, Tabular]]
 
 NOT_MEASURED = "(not measured)"
 # mesh, contacts, converter and reference of all pages but those that say otherwise
-AS_EVERYWHERE = "[simulated as everywhere](../reference/metrics.md#scenes-and-frames)"
+AS_EVERYWHERE = "[simulated as everywhere](../../docs/reference/metrics.md#scenes-and-frames)"
 PARTS = Path(__file__).parent / "pages.toml"
 _CELL = re.compile(r"\{([^{}|]+)\|([^{}|]+)\|([^{}|]+)\}")
 _INTERVAL = re.compile(r" (?:\(-?[\d.]+ to [\d.]+\)|\[-?[\d.]+, [\d.]+\])")

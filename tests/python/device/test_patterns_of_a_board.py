@@ -16,7 +16,7 @@ from eitskin.errors import DeviceError
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.session.checks.host_check import check_recording
-from eitskin.session.frame import Frame
+from eitskin.session.frame import Frame, Notice
 from eitskin.session.session import Session
 from eitskin.session.settings import SessionSettings
 from eitskin.skin.protocol import in_order, pattern, pattern_name
@@ -24,7 +24,7 @@ from eitskin.skin.skin import paper_skin
 from eitskin.truth import observe_scene
 
 SMALL = BuildSettings(pixels_across=20, elements=2000, samples=0)
-PATTERNS = [("skip-3", None, "by 7"), ("opposite", None, "by 3"), ("skip-3", "adjacent", "by 5")]
+PATTERNS = [("skip-3", None, "by 7"), ("opposite", None, "by 3"), ("skip-2", "adjacent", "by 5")]
 PLACES = np.array([[-40.0, 10.0], [30.0, -25.0]])
 
 
@@ -64,9 +64,6 @@ def test_a_simulated_board_has_the_hosts_bits(tmp_path, drive, measure, order, c
     for place in PLACES:
         near = [np.hypot(one.x_mm - place[0], one.y_mm - place[1]) for one in seen[-1].touches]
         assert min(near) < 3
-    rows = pattern(16, drive, measure).n_rows
-    folded = len(pattern(16, drive, measure).reciprocal_pairs().first)
-    assert info.frame_us == 100 * (folded if check_every == 0 else rows)
 
 
 @pytest.mark.parametrize(("drive", "measure", "order"), PATTERNS)
@@ -79,6 +76,8 @@ def test_half_scans_measure_each_voltage_once_in_the_models_order(drive, measure
         device.scan(check_every=1)
         whole = raw_frames(device, 2)[1]
     fold = protocol.reciprocal_pairs()
+    assert whole.scan_us == 100 * protocol.n_rows - 20
+    assert half.scan_us == 100 * len(fold.first) - 20
     exact = frames().voltage_v(protocol)[UNTOUCHED]
     assert whole.voltage_v == pytest.approx(exact, abs=3e-2 * np.abs(exact).max())
     assert half.voltage_v[fold.first] == pytest.approx(
@@ -99,3 +98,30 @@ def test_patterns_of_boards_are_named():
         check_model(info, decode_model(other, "model"), other, "it")
     unknown = replace(info, protocol_hash=info.protocol_hash ^ 1)
     assert scanned(unknown) is None and scanned_pattern(unknown) == "a table of 208 rows"
+
+
+OPEN = """
+[scene]
+name = "open"
+frames = 5
+quiet_frames = 8
+elements = 2000
+[effects.noise]
+snr_db = 60.0
+[effects.detached]
+electrodes = [5]
+from_s = 0.1
+"""
+
+
+@pytest.mark.parametrize(
+    "drive", ["skip-3", pytest.param("opposite", marks=pytest.mark.long("skip-3"))]
+)
+def test_an_open_electrode_is_named(tmp_path, drive):
+    model, scene = tmp_path / "model.eitm", tmp_path / "open.toml"
+    model.write_bytes(blob_of(drive, None, {one[0]: one[2] for one in PATTERNS}[drive]))
+    scene.write_text(OPEN, encoding="utf-8")
+    with Session(f"sim:{scene}", SessionSettings(tare=8, model=model)) as session:
+        texts = [item.text for item in session.messages() if isinstance(item, Notice)]
+    assert [text for text in texts if text.startswith("electrode 5 open")]
+    assert not [text for text in texts if "electrode" in text and "electrode 5" not in text]
