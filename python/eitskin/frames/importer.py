@@ -175,7 +175,8 @@ def accepted_counts(
         if options.order.endswith("-all")
         else f"; with pairs at driving electrodes {n * n}, --order fixed-all"
     )
-    return (count,), f"{n} electrodes, --order {options.order}{hint}"
+    named = f"; adjacent and skip-N have {n * (n - 3)}, opposite {n * (n - 4)}"
+    return (count,), f"{n} electrodes, --order {options.order}{hint}{named}"
 
 
 def _placed(
