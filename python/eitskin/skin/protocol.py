@@ -197,9 +197,9 @@ def pattern(
         raise ProtocolError(
             f"protocol: {n} electrodes is out of range; use {MIN_COUNT} to {MAX_COUNT}"
         )
-    spans = [_span(name, n) for name in (drive, measure or _measured_with(drive))]
-    pairs = n // 2 if spans == [n // 2, n // 2] and n % 2 == 0 else n
-    rows = _drive_and_measure(n, *spans, pairs)
+    step, measure_step = _span(drive, n), _span(measure or _measured_with(drive), n)
+    pairs = n // 2 if 2 * step == 2 * measure_step == n else n
+    rows = _drive_and_measure(n, step, measure_step, pairs)
     if not len(rows):
         raise ProtocolError(
             f"protocol: {drive} drives of {n} electrodes leave no {measure or drive} pair without"

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from eitskin.arrays import FloatArray, IntArray
+from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
 from eitskin.skin.skin import Skin
 
@@ -71,10 +71,10 @@ class ExactDisk:
         z, normal, weight, curvature, ratio = _edges(touches, self._radius_mm, nodes)
         apart = z[:, None] - z
         np.fill_diagonal(apart, 1)
-        kernel = normal[:, None] / apart
-        np.fill_diagonal(kernel, curvature / 2)
+        direct = normal[:, None] / apart
+        np.fill_diagonal(direct, curvature / 2)
         image = -z.conj() / (1 - z[:, None] * z.conj())
-        kernel = -(kernel + normal[:, None] * image).real / (2 * np.pi) * weight
+        kernel = -(direct + normal[:, None] * image).real / (2 * np.pi) * weight
         to_rim = z[:, None] - self._rim
         slope = -((normal[:, None] / to_rim).real / np.pi) @ currents
         potential = currents.T @ -(np.log(np.abs(to_rim)).T / np.pi * weight)
@@ -102,7 +102,7 @@ class ExactDisk:
         system[:size, :size] = 0.5 * (galerkin + galerkin.T)
         system[:size, size:-1], system[size:-1, :size] = -totals, totals.T
         system[-1, size:-1] = system[size:-1, -1] = 1  # the mean potential is zero
-        inverse = np.linalg.inv(system)
+        inverse: FloatArray = np.asarray(np.linalg.inv(system), dtype=np.float64)
         self._inverse = inverse[:size, :size]
         return (
             inverse[size:-1, size:-1],
@@ -141,7 +141,7 @@ def _edges(
     )
 
 
-def row_voltages(transfer_ohm: FloatArray, rows: IntArray) -> FloatArray:
+def row_voltages(transfer_ohm: FloatArray, rows: npt.ArrayLike) -> FloatArray:
     """Return the voltage per ampere of each row (..., m) of ``transfer_ohm`` (..., n, n)."""
     i_plus, i_minus, v_plus, v_minus = np.asarray(rows, dtype=np.int64).T
     u = transfer_ohm

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eitskin.arrays import FloatArray
+from eitskin.arrays import FloatArray, IntArray
 from eitskin.frames.front_end import CONVERTER_REACH_V, SHARE_USED, SOURCE_REACH_V, Demand, suitable
 from eitskin.skin.protocol import Protocol
 from eitskin.tuning.configuration import BASE_SAMPLES
@@ -25,14 +25,14 @@ class Rows:
     (m,), and what the pattern asks of the front end."""
 
     v0_v: FloatArray
-    drive: FloatArray
+    drive: IntArray
     demand: Demand
 
 
 def rows_of(protocol: Protocol, v0_v: FloatArray, demand: Demand) -> Rows:
     """The rows of ``protocol``."""
     pairs = np.unique(protocol.drive_measure[:, :2], axis=0, return_inverse=True)[1]
-    return Rows(v0_v, np.asarray(pairs).reshape(-1), demand)
+    return Rows(v0_v, np.asarray(pairs, dtype=np.int64).reshape(-1), demand)
 
 
 Noise = Callable[[Rows, Rows, float], FloatArray]
