@@ -1,4 +1,4 @@
-"""The experiment on drive patterns: the exact disk, the noise of each row, the bound, and a small
+"""The experiment on drive patterns: the noise of each row, the bound, and a small
 run."""
 
 from pathlib import Path
@@ -6,50 +6,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eitskin.fem.cem import ForwardModel
-from eitskin.fem.mesh import mesh_for_elements
 from eitskin.frames.front_end import Demand
+from eitskin.oracle.round_skin import RoundSkin
 from eitskin.scene.random_touches import TouchScene, TrueTouch
 from eitskin.skin.protocol import adjacent, pattern
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import patterns
 from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.patterns import measuring, noise
-from eitskin_studies.experiments.patterns.bound import place_bounds_mm, slopes_ohm
-from eitskin_studies.experiments.patterns.exact_disk import Disc, ExactDisk, row_voltages
+from eitskin_studies.experiments.patterns.bound import place_bounds_mm, slopes_v
 from study_pages import coarse, fills_its_page, goes_on
-
-ROWS = adjacent(16).drive_measure
 
 
 @pytest.fixture(scope="module")
-def disk() -> ExactDisk:
-    return ExactDisk(paper_skin())
-
-
-def test_the_exact_disk_converges_and_agrees_with_elements(disk):
-    skin = paper_skin()
-    elements = ForwardModel(mesh_for_elements(skin, 6000), skin, adjacent(16)).voltages(0.01)
-    exact = 1e-3 * row_voltages(disk.transfer_ohm([]), ROWS)
-    assert np.abs(exact - elements).max() < 4e-3 * np.abs(exact).max()
-    touches = [Disc(40, 20, 8, 6.0), Disc(-50, -30, 10, 0.4)]
-    fine = row_voltages(disk.transfer_ohm(touches, nodes=96), ROWS)
-    usual = row_voltages(disk.transfer_ohm(touches), ROWS)
-    change = np.abs(fine - 1e3 * exact).max()
-    assert np.abs(usual - fine).max() < 1e-9 * change
-
-
-def test_the_exact_disk_is_reciprocal_and_turns_with_its_touch(disk):
-    one = disk.transfer_ohm([Disc(60, 0, 9, 5.0)])
-    angle = 2 * np.pi / 16
-    turned = disk.transfer_ohm([Disc(60 * np.cos(angle), 60 * np.sin(angle), 9, 5.0)])
-    np.testing.assert_allclose(one, one.T, atol=1e-9 * np.abs(one).max())
-    np.testing.assert_allclose(np.roll(one, (1, 1), (0, 1)), turned, atol=1e-9 * np.abs(one).max())
+def disk() -> RoundSkin:
+    return RoundSkin(paper_skin(), adjacent(16))
 
 
 def test_the_bound_falls_with_the_noise_and_has_no_prior_of_the_place(disk):
     scene = TouchScene("one", (TrueTouch(30.0, 10.0, 9.0, 5.0),))
-    slopes = 1e-3 * row_voltages(slopes_ohm(disk, scene), ROWS)
+    slopes = slopes_v(disk, scene)
     noisy, quiet = (place_bounds_mm(slopes, np.full(208, sigma))[0] for sigma in (4e-4, 1e-4))
     assert 3.5 < noisy / quiet <= 4.2
     assert place_bounds_mm(1e-6 * slopes, np.full(208, 1e-4))[0] > 1e3
@@ -75,14 +51,11 @@ def test_each_noise_of_rows():
     assert (of("front end, gain per row") <= of("front end as described")).all()
 
 
-def test_every_drive_of_an_even_disk_has_the_same_greatest_voltage(disk):
+def test_every_drive_of_an_even_disk_has_the_same_greatest_voltage():
     for name in ("adjacent", "skip-3", "opposite"):
         protocol = pattern(16, name)
-        rows = noise.rows_of(
-            protocol,
-            1e-3 * row_voltages(disk.transfer_ohm([]), protocol.drive_measure),
-            Demand(1.0, 1.0),
-        )
+        v0_v = RoundSkin(paper_skin(), protocol).voltages([])
+        rows = noise.rows_of(protocol, v0_v, Demand(1.0, 1.0))
         by_drive = noise.converter_by_drive(rows, rows, 1e-3)
         assert by_drive == pytest.approx(noise.converter(rows, rows, 1e-3))
 

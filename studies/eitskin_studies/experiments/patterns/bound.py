@@ -10,17 +10,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from eitskin.arrays import FloatArray
-from eitskin.scene.random_touches import TouchScene
-from eitskin_studies.experiments.patterns.exact_disk import Disc, ExactDisk
+from eitskin.oracle.round_skin import RoundSkin
+from eitskin.scene.random_touches import TouchScene, TrueTouch
 
 RADIUS_PRIOR_MM, AMPLITUDE_PRIOR = 3.0, 0.17
 STEPS = np.array([0.05, 0.05, 0.03, 0.005])  # of x, y, radius in mm, and q
 MEDIAN_PER_RMS = np.sqrt(np.log(2))  # of a distance whose two parts are normal and alike
 
 
-def slopes_ohm(model: ExactDisk, scene: TouchScene) -> FloatArray:
-    """The derivatives (4 k, n, n) of the electrodes' potentials by x, y, radius, q of each of k
-    touches, by central differences."""
+def slopes_v(model: RoundSkin, scene: TouchScene) -> FloatArray:
+    """The derivatives (4 k, m) of the voltages by x, y, radius, q of each of k touches, by central
+    differences."""
     values = np.array([
         [one.x_mm, one.y_mm, one.radius_mm, 2 * (one.contrast - 1) / (one.contrast + 1)]
         for one in scene.touches
@@ -31,11 +31,11 @@ def slopes_ohm(model: ExactDisk, scene: TouchScene) -> FloatArray:
     ])  # fmt: skip
 
 
-def place_bounds_mm(slopes_v: FloatArray, sigma_v: FloatArray) -> list[float]:
-    """The median distance in mm that the bound allows each touch: ``slopes_v`` (4 k, m) and
+def place_bounds_mm(slopes: FloatArray, sigma_v: FloatArray) -> list[float]:
+    """The median distance in mm that the bound allows each touch: ``slopes`` (4 k, m) V and
     ``sigma_v`` (m,)."""
-    weighted = slopes_v / sigma_v
-    touches = len(slopes_v) // 4
+    weighted = slopes / sigma_v
+    touches = len(slopes) // 4
     prior = np.tile([0, 0, RADIUS_PRIOR_MM**-2, AMPLITUDE_PRIOR**-2], touches)
     spread = np.linalg.inv(weighted @ weighted.T + np.diag(prior))
     places: Sequence[int] = range(0, 4 * touches, 4)
@@ -43,8 +43,9 @@ def place_bounds_mm(slopes_v: FloatArray, sigma_v: FloatArray) -> list[float]:
 
 
 def _at(
-    model: ExactDisk, values: FloatArray, touch: int, parameter: int, step: float
+    model: RoundSkin, values: FloatArray, touch: int, parameter: int, step: float
 ) -> FloatArray:
     moved = values.copy()
     moved[touch, parameter] += step
-    return model.transfer_ohm([Disc(x, y, r, (2 + q) / (2 - q)) for x, y, r, q in moved.tolist()])
+    touches = [TrueTouch(x, y, r, (2 + q) / (2 - q)) for x, y, r, q in moved.tolist()]
+    return model.voltages(touches)

@@ -17,6 +17,7 @@ from eitskin.frames.front_end import FrontEnd, demand_of, suitable
 from eitskin.frames.homogeneous_fem import transfer_by_elements
 from eitskin.model.build import BuildSettings, Linearisation, make_model
 from eitskin.model.model import Model
+from eitskin.oracle.round_skin import RoundSkin
 from eitskin.scene.random_touches import TouchSet, random_touches
 from eitskin.scene.simulate import Measurement
 from eitskin.scene.streams import stream
@@ -26,8 +27,7 @@ from eitskin.skin.skin import Skin, paper_skin
 from eitskin_studies.experiments.electrodes.patterns import from_transfer, transfer
 from eitskin_studies.experiments.electrodes.tuning import tuned
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
-from eitskin_studies.experiments.patterns.bound import place_bounds_mm, slopes_ohm
-from eitskin_studies.experiments.patterns.exact_disk import ExactDisk, row_voltages
+from eitskin_studies.experiments.patterns.bound import place_bounds_mm, slopes_v
 from eitskin_studies.experiments.patterns.noise import HEADROOM, NOISES, Rows, row_gain, rows_of
 from eitskin_studies.experiments.scored import session_in_parts
 from eitskin_studies.harness.sessions import FrameSession
@@ -39,7 +39,6 @@ PATTERNS = (
 BOUND, TUNING, TESTED = 100, 48, 100  # scenes
 SNR_DB = 60.0
 KEPT = ("image", "exact", "error_mm")
-AT_1_MA = 1e-3
 
 
 @dataclass(frozen=True)
@@ -71,11 +70,11 @@ class PatternNoise:
     @cached_property
     def rows(self) -> dict[str, Rows]:
         """Each pattern's untouched rows, of the exact model."""
-        untouched_ohm, by_elements = self._exact.transfer_ohm([]), transfer_by_elements(self._skin)
+        untouched_v, by_elements = self._exact.voltages([]), transfer_by_elements(self._skin)
         return {
             name: rows_of(
                 protocol,
-                AT_1_MA * row_voltages(untouched_ohm, protocol.drive_measure),
+                from_transfer(untouched_v, protocol),
                 demand_of(by_elements, protocol),
             )
             for name, protocol in self.protocols.items()
@@ -112,15 +111,15 @@ class PatternNoise:
                 noise: {name: [] for name in PATTERNS} for noise in NOISES
             }
             for scene in self.workspace.progress(drawn.scenes, "bounds"):
-                slopes = slopes_ohm(self._exact, scene)
+                slopes = slopes_v(self._exact, scene)
                 for name, protocol in self.protocols.items():
-                    slopes_v = AT_1_MA * row_voltages(slopes, protocol.drive_measure)
+                    rows = from_transfer(slopes, protocol)
                     for noise in NOISES:
                         sigma_v = self.noise_v(name, noise)
-                        found[noise][name] += place_bounds_mm(slopes_v, sigma_v)
+                        found[noise][name] += place_bounds_mm(rows, sigma_v)
             return found
 
-        facts = {"patterns": "bounds", "scenes": len(drawn.scenes), "noises": list(NOISES)}
+        facts = {"patterns": "bounds of rows", "scenes": len(drawn.scenes), "noises": list(NOISES)}
         kept: Mapping[str, Mapping[str, list[float]]] = self.workspace.kept(facts, make)
         return kept
 
@@ -201,8 +200,8 @@ class PatternNoise:
         return paper_skin()
 
     @cached_property
-    def _exact(self) -> ExactDisk:
-        return ExactDisk(self._skin)
+    def _exact(self) -> RoundSkin:
+        return RoundSkin(self._skin, transfer(ELECTRODES))
 
     @cached_property
     def _linear(self) -> Linearisation:
