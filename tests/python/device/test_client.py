@@ -211,7 +211,7 @@ def test_another_model_is_refused_with_what_to_do():
     info = board_info(protocol_hash=model.protocol.hash, model_crc=zlib.crc32(blob))
     check_model(info, model, blob, "x")
     tiny, own = (decode_model(tiny_blob(), "tiny"), tiny_blob()), (model, blob)
-    protocol = r"scans protocol [0-9a-f]{16} \(16 electrodes, 208 rows\) and the model here"
+    protocol = r"scans adjacent \(protocol [0-9a-f]{16}, 16 electrodes, 208 rows\) and the model"
     for board, given, said in (
         (replace(info, model_crc=1), own, "model upload FILE  or name the board's with  --model"),
         (info, tiny, protocol),
