@@ -4,6 +4,7 @@ made."""
 import argparse
 import copy
 import json
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from eitskin.cli.device_options import DEVICE_HELP, open_named
 from eitskin.cli.import_options import (
     add_import_options,
     floats,
+    import_command,
     read_options,
     read_protocol,
     write_layout,
@@ -43,7 +45,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " with --device, a board whose skin is not touched; then the faults that the board itself"
         " reports are listed too. Exit code 0: nothing must be repaired; 11: something must."
     )
-    option(parser, "source", "frames file, or CSV, NPZ, MAT as for import", Path, nargs="?")
+    text = "frames file, or CSV, NPZ, MAT, .eit, .get, folder or pattern as for import"
+    option(parser, "source", text, Path, nargs="*")
     device = parser.add_argument_group("a board instead of a source")
     option(device, "--device URL", DEVICE_HELP)
     option(device, "--frames N", "number of frames to measure", default=32, within=(4, 1024))
@@ -73,7 +76,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    if (options.source is None) == (options.device is None):
+    if (not options.source) == (options.device is None):
         raise UsageError("doctor: name frames to examine, or a board: --device URL")
     ring_ohm = options.resistor_ring
     if ring_ohm is not None and (options.touch or options.skin is not None):
@@ -85,13 +88,14 @@ def run(options: argparse.Namespace) -> int:
     protocol, skin, n_electrodes = read_protocol(options)
     if options.device is not None:
         return _run_device(options, skin)
-    assert options.source is not None
     subject = subject_from_source(
         options.source, read_options(options), protocol, skin, n_electrodes
     )
     if options.touch:
         subject = _with_touches(subject, options.touch, options.touch_in)
     report, case = examine_case(_with_ring(subject, ring_ohm))
+    if report.repair:
+        report = replace(report, command=import_command(options, report.repair))
     if options.save_layout is not None:
         repaired = _repaired(options, report.repair)
         named = read_options(repaired)
@@ -104,7 +108,9 @@ def _repaired(options: argparse.Namespace, repair: str) -> argparse.Namespace:
     them."""
     parser = argparse.ArgumentParser()
     add_import_options(parser)
-    return parser.parse_args(repair.split(), argparse.Namespace(**copy.deepcopy(vars(options))))
+    return parser.parse_args(
+        shlex.split(repair), argparse.Namespace(**copy.deepcopy(vars(options)))
+    )
 
 
 def _run_device(options: argparse.Namespace, skin: Skin | None) -> int:
@@ -144,7 +150,7 @@ def _with_ring(subject: Subject, ring_ohm: float | None) -> Subject:
     if ring_ohm is None:
         return subject
 
-    n_electrodes = subject.readings[0][1].protocol.n_electrodes
+    n_electrodes = subject.readings[0].frames.protocol.n_electrodes
     return replace(subject, skin=None, stand_in=resistor_ring(n_electrodes, ring_ohm))
 
 
@@ -163,7 +169,10 @@ def _with_touches(subject: Subject, given: list[str], name: str | None) -> Subje
         raise UsageError(
             "--touch: a touch lies outside the skin; give millimetres from the outline's centre"
         )
-    readings = tuple((order, _touched(frames, touches, name)) for order, frames in subject.readings)
+    readings = tuple(
+        replace(reading, frames=_touched(reading.frames, touches, name))
+        for reading in subject.readings
+    )
     return replace(subject, readings=readings)
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from eitskin.cli.arguments import Output, option
@@ -15,11 +16,18 @@ from eitskin.skin.protocol import pattern_name
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
-        "Convert a text, NPY, NPZ or MAT file of measured voltages to a frames file, in the"
-        " protocol's order, with signs, in volts. Run  eitskin doctor SOURCE  first to find out"
+        "Convert text, NPY, NPZ, MAT, .eit or .get files of measured voltages to a frames file, in"
+        " the protocol's order, with signs, in volts. Run  eitskin doctor SOURCE  first to find out"
         " which options the source needs."
     )
-    option(parser, "source", "CSV or other text, NPY, NPZ, MAT, or a frames file to repair", Path)
+    option(
+        parser,
+        "source",
+        "CSV or other text, NPY, NPZ, MAT, .eit, .get, or a frames file to repair; several files, a"
+        " folder or a pattern are read one after another, in natural order",
+        Path,
+        nargs="+",
+    )
     option(parser, "-o --output OUT.npz", "frames file to write", Output, required=True)
     option(parser, "--json", "describe the result as JSON")
     add_import_options(parser)
@@ -48,8 +56,8 @@ def run(options: argparse.Namespace) -> int:
         "notes": list(frames.meta.get("notes", ())),
     }
     for note in facts["notes"]:
-        say(f"{options.source}: {note}")
-    with_skin = "" if options.skin is None else f" --skin {options.skin}"
+        say(f"{options.source[0]}: {note}")
+    with_skin = "" if options.skin is None else f" --skin {quote(str(options.skin))}"
     return answer(
         options,
         facts,
@@ -57,5 +65,5 @@ def run(options: argparse.Namespace) -> int:
         f" {facts['quiet_frames']} untouched, {facts['electrodes']} electrodes, {facts['pattern']},"
         f" {facts['touches']}"
         f" known touches; unit {facts['unit']}",
-        f"next: eitskin doctor {options.output}{with_skin}",
+        f"next: eitskin doctor {quote(str(options.output))}{with_skin}",
     )

@@ -1,6 +1,8 @@
 """The options of ``import`` and ``doctor`` that describe the frames of another instrument."""
 
 import argparse
+import os
+import shlex
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -87,8 +89,9 @@ def read_options(options: argparse.Namespace) -> ImportOptions:
         mask_extent_mm=None if extent is None else _four(extent),
         mask_top_first=options.truth_mask_top_first,
     )
+    meaning = ("potentials", "differences", "relative_differences")
     same = ("order", "table_file", "sign", "rotate", "equalise", "current_a")
-    own: dict[str, Any] = {name: named[name] for name in same}
+    own: dict[str, Any] = {name: named[name] for name in (*same, *meaning)}
     for name in ("flip_channels", "impute_channels", "drop_channels", "drop_electrodes"):
         own[name] = whole_numbers(named[name], f"--{name.replace('_', '-')}")
     given = ImportOptions(
@@ -110,13 +113,46 @@ def read_options(options: argparse.Namespace) -> ImportOptions:
 
 def read_layout(options: argparse.Namespace) -> Layout | None:
     """Return the layout that ``--layout`` names, or None."""
-    return None if options.layout is None else load_layout(options.layout)
+    if options.layout is None:
+        return None
+    layout = load_layout(options.layout)
+    source = layout.options.source
+    if source.reference_file is not None:
+        source = replace(source, reference_file=str(options.layout.parent / source.reference_file))
+    return replace(layout, options=replace(layout.options, source=source))
 
 
-def write_layout(path: Path, source: Path, named: ImportOptions, protocol: Protocol | None) -> None:
-    """Write a layout that reads ``source`` as the options ``named`` do."""
-    raw = read_source(source, named.source, *accepted_counts(named, protocol))
-    save_layout(path, layout_of(raw, named, protocol, str(source)))
+def write_layout(
+    path: Path, sources: list[Path], named: ImportOptions, protocol: Protocol | None
+) -> None:
+    """Write a layout that reads ``sources`` as the options ``named`` do."""
+    raw = read_source(sources, named.source, *accepted_counts(named, protocol))
+    reference = named.source.reference_file
+    if reference is not None:  # a layout names files from its own folder on
+        source = replace(
+            named.source, reference_file=os.path.relpath(reference, path.resolve().parent)
+        )
+        named = replace(named, source=source)
+    save_layout(path, layout_of(raw, named, protocol, str(sources[0])))
+
+
+def import_command(options: argparse.Namespace, repair: str) -> str:
+    """Return the command that imports the sources of ``options`` with these options and with those
+    in ``repair``, to be pasted into a shell."""
+    parser = argparse.ArgumentParser(add_help=False)
+    add_import_options(parser)
+    repairing = shlex.split(repair)
+    again = {word for word in repairing if word.startswith("--")}
+    sources = [str(one) for one in options.source]
+    out = "frames.npz" if "frames.npz" not in sources else "repaired.npz"
+    words = ["eitskin", "import", *sources, "-o", out]
+    for action in parser._actions:
+        value, name = getattr(options, action.dest), action.option_strings[-1]
+        if value == action.default or name in (*again, "--save-layout"):
+            continue
+        for one in value if isinstance(value, list) else [value]:
+            words += [name] if action.nargs == 0 else [name, f"{one}"]
+    return shlex.join([*words, *repairing])
 
 
 def _over(base: Any, given: Any) -> Any:
@@ -191,6 +227,11 @@ def _add_place(group: Any) -> None:
     )
     option(group, "--reference-columns LIST", "text: columns of the untouched frames")
     option(group, "--reference-frames LIST", "numbers of the untouched frames, such as 0:20")
+    option(
+        group,
+        "--reference-file FILE",
+        "file, folder or pattern whose frames are all untouched; it may have another delimiter",
+    )
     option(group, "--names KEY", "NPZ, MAT: array of the frames' names")
     option(group, "--time KEY", "array or column of the frames' times in s")
     option(group, "--time-scale FACTOR", "seconds per unit of the source's times", default=1.0)
@@ -200,6 +241,13 @@ def _add_place(group: Any) -> None:
     part = "part of complex numbers to keep; in text, of pairs of columns"
     option(group, "--complex-part", part, choices=parts)
     option(group, "--pairs", "meaning of pairs of columns (default: from header)", choices=PAIRS)
+    option(
+        group,
+        "--offset NUMBER",
+        "added to the source's numbers before --scale; a 12-bit converter with 0 V at mid-scale"
+        " needs --offset -2048",
+        default=0.0,
+    )
     option(group, "--scale FACTOR", "volts per unit of the source's numbers; 1 for volts", float)
     option(
         group,
@@ -214,9 +262,20 @@ def _add_place(group: Any) -> None:
 
 def _add_repairs(group: Any) -> None:
     option(group, "--order", "order of the source's channels", choices=ORDERS, default="fixed")
-    option(group, "--table-file FILE", "text table of the source's rows: I+, I-, V+, V-")
+    option(group, "--table-file FILE", "text table of the source's rows: I+, I-, V+, V- or ground")
     option(group, "--protocol-table KEY", "NPZ, MAT: array with that table")
     option(group, "--table-base N", "number of the first electrode in the table", default=0)
+    option(
+        group,
+        "--potentials",
+        "a channel is the potential of one electrode against ground; rows are their differences",
+    )
+    option(
+        group,
+        "--differences",
+        "the reference was subtracted already; the skin's prediction takes its place",
+    )
+    option(group, "--relative-differences", "the same, and divided by the reference")
     signs = ("signed", "reversed", "magnitude")
     option(
         group,

@@ -53,6 +53,7 @@ class Source:
         keeps: frames that nobody wants yet wait, as in a pipe; else they are lost.
         ended: no frame will come again.
         period_s: from frame to frame, where it is known.
+        offset, scale: see ``Capabilities``.
     """
 
     name = "source"
@@ -60,6 +61,7 @@ class Source:
     keeps = False
     ended = False
     period_s: float | None = None
+    offset, scale = 0.0, 1.0
 
     def use_model(self, model: Model) -> None:
         """The board uses ``model`` from now on: give frames in its rows.
@@ -128,7 +130,8 @@ class SourceTransport(Transport):
 
     @property
     def capabilities(self) -> Capabilities:
-        return Capabilities(own_clock=self.source.synchronous)
+        source = self.source
+        return Capabilities(own_clock=source.synchronous, offset=source.offset, scale=source.scale)
 
     @property
     def ended(self) -> bool:  # type: ignore[override]

@@ -34,6 +34,8 @@ class TextSource(Source):
         if self._parser.cells is None and layout.form.label is not None:
             raise UsageError(f"{where}: [lines] needs  cells, the numbers of a frame, with a label")
         self._layout, self._form = layout, layout.form
+        numbers = layout.options.source
+        self.offset, self.scale = numbers.offset, 1.0 if numbers.scale is None else numbers.scale
         self._reader = LineReader(self._form, self._parser.cells)
         self._placement: RowPlacement | None = None
         self._rest, self._lines = b"", 0

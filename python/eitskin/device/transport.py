@@ -38,6 +38,8 @@ class Capabilities:
         slow: its time passes more slowly than ours: ``watch`` says how far it is.
         baud: bits per second of the line, where a line limits how many frames come.
         scene: what a simulated skin is shown; None before a real one.
+        offset, scale: an instrument's own number is a voltage after ``offset`` was added to it and
+            it was multiplied by ``scale``.
     """
 
     own_clock: bool = False
@@ -45,6 +47,8 @@ class Capabilities:
     slow: bool = False
     baud: int | None = None
     scene: SimulatedScene | None = None
+    offset: float = 0.0
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def with_eidors_defaults(
     named: dict[str, Any] = {}
     if source.voltage is None:
         named["voltage"] = _named(content, TOUCHED)
-    if source.reference is None and source.reference_frames is None:
+    if not (source.reference or source.reference_frames or source.reference_file):
         named["reference"] = _named(content, UNTOUCHED)
     if source.scale is None:
         named["scale"] = 1 / model.gain

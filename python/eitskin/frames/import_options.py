@@ -10,6 +10,11 @@ from eitskin.frames.truth import TruthOptions
 class ImportOptions:
     """The options for repairing a source; the defaults change nothing.
 
+    With ``potentials`` a channel is the potential of one electrode against ground, and a row the
+    difference of two. With ``differences`` the frames are changes of an unknown reference already,
+    in place of which the skin's predicted voltages are put; with ``relative_differences`` they are
+    divided by it, too.
+
     ``order`` is one of ORDERS, or "table" with ``table_file`` (text with four columns) or ``table``
     (rows from 0). ``keep_table`` keeps the source's own table. ``sign`` is "signed"; "reversed",
     which negates; or "magnitude", which takes the sign of each row from the homogeneous prediction.
@@ -27,6 +32,9 @@ class ImportOptions:
     table_file: str | None = None
     table: tuple[tuple[int, int, int, int], ...] | None = None
     keep_table: bool = False
+    potentials: bool = False
+    differences: bool = False
+    relative_differences: bool = False
     sign: str = "signed"
     rotate: int = 0
     mirror: bool = False

@@ -24,8 +24,8 @@ from eitskin.errors import ConfigError, EitskinError, UsageError
 from eitskin.fileio import write_bytes
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.lines import LineFormat, Row, parse_cell
-from eitskin.frames.orders import ORDERS
-from eitskin.frames.pairs import PAIRS, Paired, to_complex
+from eitskin.frames.orders import GROUND, ORDERS
+from eitskin.frames.pairs import PAIRS, Paired, shifted, to_complex
 from eitskin.frames.placement import table_rows
 from eitskin.frames.repair import SIGNS
 from eitskin.frames.source import COMPLEX_PARTS, RawFrames, SourceOptions
@@ -38,10 +38,12 @@ LINES: dict[str, Any] = {
     "delimiter": "text", "label": "text", "comment": "texts", "cells": "whole",
     "columns": "text", "header_rows": "whole",
     "skip_bad_lines": "flag", "time": "text", "time_scale": "number",
-    "complex_part": COMPLEX_PARTS, "pairs": PAIRS, "scale": "number",
+    "complex_part": COMPLEX_PARTS, "pairs": PAIRS, "scale": "number", "offset": "number",
+    "reference_frames": "text", "reference_file": "text",
 }  # fmt: skip
 CHANNELS: dict[str, Any] = {
-    "order": (*ORDERS, "table"), "sign": SIGNS, "rotate": "whole", "mirror": "flag",
+    "order": (*ORDERS, "table"), "potentials": "flag", "differences": "flag",
+    "relative_differences": "flag", "sign": SIGNS, "rotate": "whole", "mirror": "flag",
     "clockwise": "flag", "flip_channels": "wholes", "impute_channels": "wholes",
     "drop_channels": "wholes", "drop_electrodes": "wholes", "equalise": "flag",
     "current_a": "number",
@@ -92,7 +94,7 @@ def load_layout(path: str | Path) -> Layout:
     options = ImportOptions(source=source, **_values(channels, CHANNELS, f"{where}: [channels]"))
     in_channels = f"{where}: [channels]"
     if "table" in channels:
-        rows = _rows(channels["table"], 4, f"{in_channels}: table")
+        rows = _rows(channels["table"], 4, f"{in_channels}: table", GROUND)
         options = replace(options, order="table", table=rows)
     if "swaps" in channels:
         options = replace(options, swaps=_rows(channels["swaps"], 2, f"{in_channels}: swaps"))
@@ -155,7 +157,7 @@ def layout_of(
         )
     source = replace(
         options.source,
-        delimiter=read.form.delimiter,
+        delimiter=read.form.delimiter if read.one_delimiter else None,
         label=read.form.label,
         header_rows=None if read.form.label is not None else read.header_rows or None,
         cells=read.cells,
@@ -163,7 +165,6 @@ def layout_of(
         pairs=read.pairs,
         time=None if read.time is None else str(read.time),
         reference_columns=None,
-        reference_frames=None,
     )
     table = table_rows(options)
     if table is not None:
@@ -248,7 +249,9 @@ class LineParser:
         if source.pairs is not None:
             places = range(len(values))
             pairs = Paired(tuple(places[0::2]), tuple(places[1::2]), source.pairs)
-            values = to_complex(values[None].real, pairs)[0]
+            values = to_complex(shifted(values[None].real, pairs, source.offset), pairs)[0]
+        elif not np.iscomplexobj(values):
+            values = values + source.offset
         if source.complex_part == "abs":
             values = np.abs(values)
         elif source.complex_part in ("real", "imag"):
@@ -329,16 +332,16 @@ def _texts(value: Any, where: str) -> list[str]:
     return value
 
 
-def _wholes(value: Any, where: str) -> list[int]:
-    if not isinstance(value, list) or not all(type(one) is int and one >= 0 for one in value):
+def _wholes(value: Any, where: str, low: int = 0) -> list[int]:
+    if not isinstance(value, list) or not all(type(one) is int and one >= low for one in value):
         raise ConfigError(f"{where} must be a list of whole numbers, not {value!r}")
     return value
 
 
-def _rows(value: Any, width: int, where: str) -> tuple[Any, ...]:
+def _rows(value: Any, width: int, where: str, low: int = 0) -> tuple[Any, ...]:
     if not isinstance(value, list) or not value:
         raise ConfigError(f"{where} must be a list of rows of {width} whole numbers")
-    rows = tuple(tuple(_wholes(row, f"{where}: a row")) for row in value)
+    rows = tuple(tuple(_wholes(row, f"{where}: a row", low)) for row in value)
     if any(len(row) != width for row in rows):
         raise ConfigError(f"{where}: every row must be {width} whole numbers")
     return rows

@@ -1,9 +1,12 @@
 """Divide the lines of an instrument into rows of cells. Files and live lines use the same
 parser."""
 
+import csv
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 
 from eitskin.errors import UsageError
 
@@ -11,6 +14,9 @@ DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": 
 COMMENT = ("#", "%")
 # repetitions are bounded, so that no line takes long to match
 OWN_LABEL = re.compile(r"\s{0,40}([A-Za-z_][A-Za-z_ -]{0,39}?)\s{0,40}\d{0,12}\s{0,40}[:=]")
+LONE_LABEL = re.compile(
+    r"\s{0,40}([A-Za-z_][A-Za-z_ -]{0,39}?)\s{0,40}\d{0,12}\s{0,40}[:=]?\s{0,40}"
+)
 AFTER_LABEL = r"(?:\s{0,40}\d{0,12}\s{0,40}(?:[:=]|$))?\s*"
 DECIMALS = re.compile(r"decimals:([1-9])")
 
@@ -55,8 +61,12 @@ class LineFormat:
             return tuple(re.findall(number, text)) if whole else (text.strip(),)
         separator = DELIMITERS.get(self.delimiter, self.delimiter)
         if separator is None or separator == " ":
-            return tuple(text.split())
-        return tuple(cell.strip().strip('"').strip() for cell in text.split(separator))
+            return tuple(cell.strip('"') for cell in text.split())
+        if '"' in text:  # a delimiter within quotes belongs to the cell
+            with suppress(csv.Error):
+                quoted = next(csv.reader([text], delimiter=separator, skipinitialspace=True), [])
+                return tuple(cell.strip() for cell in quoted)
+        return tuple(cell.strip() for cell in text.split(separator))
 
     def passed_over(self, line: str) -> bool:
         """Return whether ``line`` is empty or a comment."""
@@ -126,8 +136,10 @@ def parse_cell(cell: str) -> complex | None:
             return float(text)
         except ValueError:
             pass
+        if text[-1:].lower() not in ("i", "j", ")"):
+            continue
         try:
-            return complex(text.replace(" ", "").replace("i", "j"))
+            return complex(re.sub(r"\s*([-+])\s*", r"\1", text).replace("i", "j"))
         except ValueError:
             pass
     return None
@@ -145,3 +157,20 @@ def own_labels(lines: Sequence[str]) -> dict[str, int]:
         if match is not None and any(letter.isdigit() for letter in line[match.end() :]):
             found[match.group(1)] = found.get(match.group(1), 0) + 1
     return found if 2 * sum(found.values()) > numbers else {}
+
+
+def lone_labels(lines: Sequence[str]) -> dict[str, int]:
+    """Return the words that stand alone on a line above numbers, such as "k" or "frame 12:", and
+    how many lines have each."""
+    found: dict[str, int] = {}
+    for line, below in pairwise(lines):
+        match = LONE_LABEL.fullmatch(line)
+        if match is not None and begins_with_number(below):
+            found[match.group(1)] = found.get(match.group(1), 0) + 1
+    return found
+
+
+def begins_with_number(line: str) -> bool:
+    """Return whether the first word of ``line`` is a number, whatever the delimiter is."""
+    words = re.split(r'[\s,;|"]+', line.strip().strip('"'), maxsplit=1)
+    return parse_cell(words[0]) is not None

@@ -122,6 +122,16 @@ def _checked(values: AnyArray, pairs: Paired, option: str) -> Paired:
     return pairs
 
 
+def shifted(values: AnyArray, pairs: Paired, offset: float) -> AnyArray:
+    """Return the columns (rows, c) with ``offset`` added to what the instrument measures: to real
+    and imaginary parts, or to magnitudes."""
+    moved = np.array(values, dtype=np.float64)
+    moved[:, list(pairs.first)] += offset
+    if pairs.how == "real-imag":
+        moved[:, list(pairs.second)] += offset
+    return moved
+
+
 def to_complex(values: AnyArray, pairs: Paired) -> ComplexArray:
     """Return the columns (rows, c) as complex numbers (rows, c / 2)."""
     first, second = values[:, list(pairs.first)], values[:, list(pairs.second)]

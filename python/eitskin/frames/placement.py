@@ -1,7 +1,7 @@
 """The origin of each row of a frame in the order of a source: electrodes are renumbered, rows put
 in the order of a protocol, and signs set."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,6 +9,8 @@ from eitskin.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from eitskin.errors import FrameError, UsageError
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.orders import (
+    GROUND,
+    RowMatch,
     electrode_map,
     match_rows,
     relabel,
@@ -22,6 +24,8 @@ from eitskin.frames.tables import read_table
 from eitskin.model.model import Model
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
+
+GROUND_WORDS = ("ground", "gnd", "g", "-")
 
 
 def source_rows(
@@ -46,11 +50,11 @@ def source_rows(
             raise UsageError(
                 "say which protocol: --skin FILE, --protocol PATTERN --electrodes N, or a table"
             )
-        given = source_table(options.order, protocol)
-    elif given.min(initial=0) < 0 or given.max(initial=0) >= n:
+        given = source_table(options.order, protocol, potentials=options.potentials)
+    elif _least_electrode(given) < 0 or given.max(initial=0) >= n:
         raise FrameError(
-            f"{where}: the table names electrodes {given.min()} to {given.max()}, but they are 0 to"
-            f" {n - 1}; if it counts from 1 say --table-base 1"
+            f"{where}: the table names electrodes {_least_electrode(given)} to {given.max()}, but"
+            f" they are 0 to {n - 1}; if it counts from 1 say --table-base 1"
         )
     flipped = options.mirror or (
         options.clockwise and not (skin is not None and skin.electrodes.clockwise)
@@ -70,31 +74,47 @@ def table_rows(options: ImportOptions) -> IntArray | None:
         raise FrameError(
             f"{options.table_file}: has {text.n_columns} columns; a table has four: I+, I-, V+, V-"
         )
-    return electrode_table(text.numbers(range(4)), options.source.table_base, options.table_file)
+    base = options.source.table_base
+    cells = tuple(
+        (*row[:3], str(base + GROUND) if row[3].lower() in GROUND_WORDS else row[3])
+        for row in text.cells
+    )
+    return electrode_table(replace(text, cells=cells).numbers(range(4)), base, options.table_file)
+
+
+def _least_electrode(rows: IntArray) -> int:
+    """Return the least number of an electrode in ``rows``; ground in place of V- is not one."""
+    named = np.concatenate([rows[:, :3].ravel(), rows[rows[:, 3] != GROUND, 3]])
+    return int(named.min()) if len(named) else 0
 
 
 @dataclass(frozen=True, eq=False)
 class RowPlacement:
     """The map from frames as a source lists them to the rows of a model.
 
-    Row r is ``sign[r]`` times the source's channel ``index[r]`` (with ``magnitude``: times its
-    magnitude), and it is unusable if ``blank[r]``. ``channels`` is the number of channels in a
-    frame of the source.
+    The rows are those of ``match``, times ``sign`` (with ``magnitude``: their magnitudes times
+    ``sign``), plus ``base``, which is the untouched frame of the model where the source sends
+    differences and otherwise 0. Row r is unusable if ``blank[r]``. ``channels`` is the number of
+    channels in a frame of the source.
     """
 
     channels: int
-    index: IntArray
+    match: RowMatch
     sign: FloatArray
     blank: BoolArray
     magnitude: bool
+    base: FloatArray
+    relative: bool = False
 
     def frame(self, values: AnyArray) -> AnyArray:
         """Return the frame (m,) for ``values`` (channels,), real or complex; NaN marks a row that
         cannot be used."""
-        placed = values[self.index]
+        placed = self.match.taken_from(values)
         if self.magnitude:
             placed = np.abs(placed)
-        return np.asarray(np.where(self.blank, np.nan, placed * self.sign))
+        placed = placed * self.sign
+        placed = self.base * (1 + placed) if self.relative else self.base + placed
+        return np.asarray(np.where(self.blank, np.nan, placed))
 
 
 def place(
@@ -126,7 +146,8 @@ def place(
             f"{where}: its frames lack rows of the model's protocol; name the protocol of the"
             " frames in the layout, or use a model for that protocol"
         ) from None
-    sign = match.sign.astype(np.float64)
+    refuse_contradictions(options, where)
+    sign = np.ones(len(measured))
     magnitude = options.sign == "magnitude"
     if magnitude:
         sign = np.where(_expected(model) < 0, -1.0, 1.0)
@@ -134,15 +155,39 @@ def place(
         sign = -sign
     check_range(options.flip_channels, len(measured), "--flip-channels")
     sign[list(options.flip_channels)] *= -1
-    index = match.index.copy()
     check_range(options.impute_channels, len(measured), "--impute-channels")
     filled = good_reciprocals(options.impute_channels, measured, n)
     for channel, (other, between) in filled.items():
-        index[channel], sign[channel] = index[other], between * sign[other]
+        match = match.filled(channel, other)
+        sign[channel] = between * sign[other]
     check_range(options.drop_channels, len(measured), "--drop-channels")
     blank = touching(measured, options.drop_electrodes)
     blank[list(options.drop_channels)] = True
-    return RowPlacement(len(rows), index, sign, blank, magnitude)
+    relative = options.relative_differences
+    base = _expected(model) if options.differences or relative else np.zeros(len(measured))
+    return RowPlacement(len(rows), match, sign, blank, magnitude, base, relative)
+
+
+def refuse_contradictions(options: ImportOptions, where: str) -> None:
+    """Raise a UsageError if ``options`` say two things of the numbers that cannot both be."""
+    differences = options.differences or options.relative_differences
+    if options.differences and options.relative_differences:
+        raise UsageError(
+            f"{where}: --differences and --relative-differences contradict each other; give one"
+        )
+    if options.sign == "magnitude" and (differences or options.potentials):
+        what = "differences" if differences else "potentials"
+        raise UsageError(f"{where}: --sign magnitude: {what} need their signs; leave it out")
+    if options.equalise and differences:
+        raise UsageError(
+            f"{where}: --equalise: frames that are differences have no reference of their own;"
+            " leave it out"
+        )
+    if options.potentials and options.source.complex_part == "abs":
+        raise UsageError(
+            f"{where}: --complex-part abs: potentials are subtracted, so they need their phases;"
+            " say  --complex-part in-phase"
+        )
 
 
 def _expected(model: Model) -> FloatArray:

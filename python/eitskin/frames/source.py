@@ -1,22 +1,36 @@
-"""Read a measured source (text, NPY, NPZ or MAT) as frames whose channels are still in the source's
-own order."""
+"""Read a measured source (text, NPY, NPZ, MAT or a device's own file; one or several) as frames
+whose channels are still in the source's own order."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from eitskin.arrays import AnyArray, FloatArray, IntArray
-from eitskin.errors import FrameError, UsageError
+from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.frames.arrays import listing, pick, read_arrays, read_npz
 from eitskin.frames.frames import FORMAT
+from eitskin.frames.instrument_files import InstrumentFile, read_instrument_file
 from eitskin.frames.lines import COMMENT, LineFormat
-from eitskin.frames.pairs import PAIRS, Paired, all_magnitudes, paired, refuse_parts, to_complex
-from eitskin.frames.tables import TextTable, chosen, read_table
+from eitskin.frames.pairs import (
+    PAIRS,
+    Paired,
+    all_magnitudes,
+    paired,
+    refuse_parts,
+    shifted,
+    to_complex,
+)
+from eitskin.frames.several_files import source_files
+from eitskin.frames.tables import TextTable, chosen, counting_column, read_table
 
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
 ARRAY_SUFFIXES = (".npz", ".npy", ".mat")
+INSTRUMENT_SUFFIXES = (".eit", ".get")
+SUFFIXES = (*TEXT_SUFFIXES, *ARRAY_SUFFIXES, *INSTRUMENT_SUFFIXES)
+SPREADSHEETS = (".xlsx", ".xls", ".ods", ".numbers")
+MIN_LINES, MIN_LINE = 4, 4  # of a frame over several lines without a label
 FRAMES_IN = ("auto", "rows", "columns")
 COMPLEX_PARTS = ("real", "imag", "abs", "in-phase")
 
@@ -30,12 +44,13 @@ class SourceOptions:
     "0:416:2", header names), and ``time`` one column, whose numbers times ``time_scale`` are
     seconds.
 
-    ``reference_frames`` chooses the untouched frames among the frames. ``scale`` converts the
-    source's numbers to V (None: unknown, taken as 1). ``frames_in`` tells whether the frames of a
-    table are rows or columns. ``complex_part`` is what to keep of complex numbers; in text, columns
-    then come in ``pairs``, one of PAIRS (None: as the header says). ``delimiter``, ``label`` and
-    ``comment`` are as in ``lines.LineFormat``; ``cells`` is the number of cells in each line, if
-    known.
+    ``reference_frames`` chooses the untouched frames among the frames; ``reference_file`` names
+    another source, all of whose frames are untouched. ``offset`` is added to the source's numbers,
+    and then ``scale`` converts them to V (None: unknown, taken as 1). ``frames_in`` tells whether
+    the frames of a table are rows or columns. ``complex_part`` is what to keep of complex numbers;
+    in text, columns then come in ``pairs``, one of PAIRS (None: as the header says).
+    ``delimiter``, ``label`` and ``comment`` are as in ``lines.LineFormat``; ``cells`` is the number
+    of cells in each line, if known.
     """
 
     voltage: str | None = None
@@ -43,6 +58,7 @@ class SourceOptions:
     columns: str | None = None
     reference_columns: str | None = None
     reference_frames: str | None = None
+    reference_file: str | None = None
     names: str | None = None
     time: str | None = None
     protocol_table: str | None = None
@@ -50,6 +66,7 @@ class SourceOptions:
     frames_in: str = "auto"
     complex_part: str | None = None
     scale: float | None = None
+    offset: float = 0.0
     delimiter: str | None = None
     header_rows: int | None = None
     label: str | None = None
@@ -72,6 +89,7 @@ class ReadText:
     columns: tuple[int, ...]
     pairs: str | None
     time: int | None
+    one_delimiter: bool = True  # all files have that of ``form``
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,16 +99,19 @@ class RawFrames:
 
     ``table`` (rows, 4) is the source's own protocol, if it has one. ``arrays`` is everything that
     an NPZ or MAT file holds. ``notes`` are for the user. ``text`` describes how text was read.
+    ``current_a`` is the drive current and ``in_volts`` the unit, if the source states them.
     """
 
-    voltage: FloatArray
-    reference: FloatArray | None
+    voltage: AnyArray
+    reference: AnyArray | None
     names: tuple[str, ...] = ()
     time_s: FloatArray | None = None
     table: IntArray | None = None
     arrays: Mapping[str, AnyArray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     text: ReadText | None = None
+    current_a: float | None = None
+    in_volts: bool = False
 
 
 def is_frames_file(path: str | Path) -> bool:
@@ -101,10 +122,14 @@ def is_frames_file(path: str | Path) -> bool:
 
 
 def read_source(
-    path: str | Path, options: SourceOptions, row_counts: Iterable[int], asked: str
+    path: str | Path | Sequence[str | Path],
+    options: SourceOptions,
+    row_counts: Iterable[int],
+    asked: str,
 ) -> RawFrames:
-    """Read ``path``. A frame may have any of ``row_counts`` channels; ``asked`` gives the reason in
-    errors.
+    """Read ``path``: a file, a folder, a pattern, or several of them, whose frames are put one
+    after another (``several_files.source_files``). A frame may have any of ``row_counts`` channels;
+    ``asked`` gives the reason in errors.
 
     Raises:
         FileError: the file cannot be read.
@@ -112,16 +137,130 @@ def read_source(
         FrameError: an array or column is missing, has another shape, or holds no numbers.
         MissingExtraError: a .mat file needs scipy.
     """
-    suffix = Path(path).suffix.lower()
     _check_words(options)
+    counts = tuple(row_counts)
+    own = options.reference_file
+    untouched = () if own is None else source_files(own, SUFFIXES)
+    files = source_files(path, SUFFIXES, left_out=untouched)
+    raw = _joined([_read_one(file, options, counts, asked) for file in files], files)
+    if own is not None:
+        if raw.reference is not None or options.reference_frames is not None:
+            raise UsageError("--reference-file does not go with another reference; name one")
+        raw = replace(raw, reference=_reference_from(untouched, options, raw.voltage.shape[1]))
+    return _finish(raw, options)
+
+
+def _read_one(
+    path: Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
+) -> RawFrames:
+    suffix = path.suffix.lower()
     if suffix in TEXT_SUFFIXES:
-        return _from_text(path, options, tuple(row_counts), asked)
+        return _from_text(path, options, row_counts, asked)
     if suffix in ARRAY_SUFFIXES:
-        return _from_arrays(path, options, tuple(row_counts), asked)
-    raise UsageError(
-        f"{path}: the suffix {suffix!r} is not known; use"
-        f" {', '.join((*TEXT_SUFFIXES, *ARRAY_SUFFIXES))}"
+        return _from_arrays(path, options, row_counts, asked)
+    if suffix in INSTRUMENT_SUFFIXES:
+        return _from_instrument(path, options)
+    hint = "; save the sheet as CSV" if suffix in SPREADSHEETS else ""
+    raise UsageError(f"{path}: the suffix {suffix!r} is not known; use {', '.join(SUFFIXES)}{hint}")
+
+
+def _from_instrument(path: Path, options: SourceOptions) -> RawFrames:
+    of_others = ("voltage", "reference", "names", "protocol_table", "columns", "reference_columns")
+    _refuse(
+        options, (*of_others, "time", "delimiter", "header_rows", "label", "pairs"), path.suffix
     )
+    read: InstrumentFile = read_instrument_file(path)
+    if options.offset and np.iscomplexobj(read.voltage):
+        raise UsageError(f"--offset {options.offset:g} goes with real numbers; {path} has complex")
+    return RawFrames(
+        voltage=read.voltage + options.offset,
+        reference=None,
+        time_s=read.time_s,
+        table=read.table,
+        notes=read.notes,
+        current_a=read.current_a,
+        in_volts=read.in_volts,
+    )
+
+
+def _reference_from(files: Sequence[Path], options: SourceOptions, count: int) -> AnyArray:
+    """Return all frames of files that hold the untouched frames alone. Text may lack the columns
+    that ``options`` leave out, and have another delimiter and header unless these are given."""
+    kept = replace(
+        options,
+        reference=None,
+        reference_file=None,
+        reference_columns=None,
+        reference_frames=None,
+        names=None,
+        time=None,
+        protocol_table=None,
+    )
+    read = []
+    for file in files:
+        of_text = file.suffix.lower() in TEXT_SUFFIXES
+        own = replace(kept, voltage=None)
+        if not of_text:
+            own = replace(own, columns=None, delimiter=None, header_rows=None, label=None)
+            own = replace(own, pairs=None, cells=None)
+        if file.suffix.lower() in ARRAY_SUFFIXES:
+            arrays = read_arrays(file)
+            wanted = (options.reference, "vh", options.voltage)
+            own = replace(own, voltage=next((name for name in wanted if name in arrays), None))
+        read.append(_read_untouched(file, own, count))
+    return _joined(read, files).voltage
+
+
+def _read_untouched(file: Path, options: SourceOptions, count: int) -> RawFrames:
+    """Read a file of untouched frames as the other frames are read; if it cannot be read so, then
+    with all of its columns, or with a delimiter of its own."""
+    guessed = replace(options, delimiter=None, header_rows=None, cells=None, label=None)
+    tries = (options, replace(options, columns=None), guessed, replace(guessed, columns=None))
+    refused: EitskinError | None = None
+    for tried in tries:
+        try:
+            return _read_one(file, tried, (count,), "as the other frames have")
+        except (UsageError, FrameError) as error:
+            refused = refused or error
+    assert refused is not None
+    raise refused
+
+
+def _joined(parts: Sequence[RawFrames], files: Sequence[Path]) -> RawFrames:
+    """Return the frames of several files, one after another."""
+    if len(parts) == 1:
+        return parts[0]
+    first = parts[0]
+    names: list[str] = []
+    for part, file in zip(parts, files, strict=True):
+        if part.voltage.shape[1] != first.voltage.shape[1]:
+            raise FrameError(
+                f"{file}: its frames have {part.voltage.shape[1]} channels, those of {files[0]}"
+                f" {first.voltage.shape[1]}; leave it out"
+            )
+        if not _same_table(part.table, first.table):
+            raise FrameError(f"{file}: has another table of rows than {files[0]}; leave it out")
+        own = part.names or tuple(map(str, range(len(part.voltage))))
+        names += [file.stem] if len(own) == 1 else [f"{file.stem}:{name}" for name in own]
+    references = [part.reference for part in parts if part.reference is not None]
+    times = [part.time_s for part in parts if part.time_s is not None]
+    texts = [part.text for part in parts if part.text is not None]
+    text = texts[0] if len(texts) == len(parts) else None
+    if text is not None and len({read.form.delimiter for read in texts}) > 1:
+        text = replace(text, one_delimiter=False)
+    return replace(
+        first,
+        voltage=np.vstack([part.voltage for part in parts]),
+        reference=np.vstack(references) if references else None,
+        names=tuple(names),
+        time_s=np.concatenate(times) if len(times) == len(parts) else None,
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        text=text,
+    )
+
+
+def _same_table(one: IntArray | None, other: IntArray | None) -> bool:
+    return np.array_equal(one, other) if one is not None and other is not None else one is other
 
 
 def electrode_table(rows: AnyArray, base: int, where: str) -> IntArray:
@@ -142,12 +281,14 @@ def electrode_table(rows: AnyArray, base: int, where: str) -> IntArray:
     return table.astype(np.int64) - base
 
 
-def refuse_nonfinite(raw: RawFrames, where: str) -> None:
-    """Raise a FrameError if a voltage is not finite."""
+def refuse_nonfinite(raw: RawFrames, used: IntArray, where: str) -> None:
+    """Raise a FrameError if a voltage in one of the rows ``used`` is not finite."""
     for what, values in (("frames", raw.voltage), ("reference", raw.reference)):
-        bad = np.argwhere(~np.isfinite(values)) if values is not None else np.zeros((0, 2))
-        if values is not None and len(bad):
-            frame, row = (int(k) for k in bad[0])
+        if values is None:
+            continue
+        bad = np.argwhere(~np.isfinite(values[:, used]))
+        if len(bad):
+            frame, row = int(bad[0, 0]), int(used[bad[0, 1]])
             raise FrameError(
                 f"{where}: {what}: frame {frame}, row {row} (from 0) is {values[frame, row]}"
                 f" ({len(bad)} such values); repair the source, or leave those frames out"
@@ -166,6 +307,8 @@ def _check_words(options: SourceOptions) -> None:
             )
     if options.scale is not None and not (np.isfinite(options.scale) and options.scale != 0):
         raise UsageError(f"--scale {options.scale:g}: must be finite and not 0")
+    if not np.isfinite(options.offset):
+        raise UsageError(f"--offset {options.offset:g}: must be finite")
     if not (np.isfinite(options.time_scale) and options.time_scale > 0):
         raise UsageError(f"--time-scale {options.time_scale:g}: must be finite and above 0")
     if options.pairs is not None and options.complex_part is None:
@@ -181,9 +324,10 @@ def _refuse(options: SourceOptions, names: Iterable[str], kind: str) -> None:
 
 
 def _from_text(
-    path: str | Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
+    path: Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
 ) -> RawFrames:
     _refuse(options, ("voltage", "reference", "names", "protocol_table"), "text")
+    pairs_wanted = options.complex_part is not None
     table = read_table(
         path,
         options.delimiter,
@@ -192,23 +336,34 @@ def _from_text(
         skip_bad_lines=options.skip_bad_lines,
         comment=options.comment,
         cells=options.cells,
+        fits=(*row_counts, *(2 * n for n in row_counts if pairs_wanted)),
     )
     untouched = _columns(table, options.reference_columns, "--reference-columns")
     time = _columns(table, options.time, "--time")
     columns = _columns(table, options.columns, "--columns")
-    if columns is None:
-        columns = tuple(
-            k
-            for k in range(table.n_columns)
-            if k not in (untouched or ()) and k not in (time or ())
-        )
     notes = list(table.notes)
+    if columns is None:
+        named = {*(untouched or ()), *(time or ())}
+        columns = tuple(k for k in range(table.n_columns) if k not in named)
+        fitting = len(columns) in row_counts or len(columns) in (2 * n for n in row_counts)
+        if 0 in columns and not fitting and counting_column(table):
+            notes.append("the first column counts the rows and is left out")
+            columns = columns[1:]
     where = f"{path}: {len(table.cells)} rows, {len(columns)} chosen columns"
     values, pairs = _numbers(table, columns, options, "--columns", notes)
+    asked = f"{asked}; {table.found}"
     reference = None
     if untouched is not None:
         reference, _ = _numbers(table, untouched, options, "--reference-columns", notes)
-    in_rows = _frames_in_rows(values.shape, row_counts, options.frames_in, where, asked)
+    lines = _lines_of_a_frame(values.shape, row_counts, options.frames_in)
+    if lines > 1:
+        notes.append(f"{lines} lines of {values.shape[1]} numbers are taken for one frame")
+        values = values.reshape(len(values) // lines, -1)
+        if time is not None:
+            raise UsageError(f"{path}: --time names one column, and needs a frame in each row")
+    in_rows = lines > 1 or _frames_in_rows(
+        values.shape, row_counts, options.frames_in, where, asked
+    )
     if in_rows and untouched is not None:
         raise UsageError(
             "--reference-columns needs channels in rows; where frames are rows use"
@@ -222,7 +377,7 @@ def _from_text(
     if not in_rows and table.header and options.complex_part is None:
         names = tuple(table.header[k] for k in columns)
     read = None
-    if in_rows:
+    if in_rows and lines == 1:
         order = columns if pairs is None else _interleaved(columns, pairs)
         how = None if pairs is None else pairs.how
         at = None if time is None else time[0]
@@ -230,8 +385,20 @@ def _from_text(
     times = None if time is None else table.numbers(time)[:, 0] * options.time_scale
     if times is not None and np.iscomplexobj(times):
         raise FrameError(f"{path}: --time {options.time}: the times are complex numbers")
-    raw = _finish(values, reference, names, times, None, {}, options)
-    return replace(raw, notes=tuple(dict.fromkeys(notes)), text=read)
+    return RawFrames(values, reference, names, times, notes=tuple(dict.fromkeys(notes)), text=read)
+
+
+def _lines_of_a_frame(shape: tuple[int, ...], row_counts: tuple[int, ...], frames_in: str) -> int:
+    """Return how many lines make a frame: more than one where neither side fits, but a line for
+    each drive does."""
+    rows, columns = shape
+    if frames_in != "auto" or rows in row_counts or columns in row_counts or columns < MIN_LINE:
+        return 1
+    for count in row_counts:
+        lines = count // columns
+        if lines >= MIN_LINES and lines * columns == count and rows % lines == 0:
+            return lines
+    return 1
 
 
 def _numbers(
@@ -243,6 +410,7 @@ def _numbers(
 ) -> tuple[AnyArray, Paired | None]:
     """Return the chosen columns as numbers (complex for pairs), and how they formed pairs."""
     values = table.numbers(columns)
+    _refuse_complex_offset(values, options)
     names = tuple(table.header[k] for k in columns) if table.header else ()
     if options.complex_part is None:
         refuse_parts(names, option)
@@ -250,11 +418,16 @@ def _numbers(
             notes.append(
                 "the header calls the columns magnitudes; --sign magnitude gives them signs"
             )
-        return values, None
+        return values + options.offset, None
     if np.iscomplexobj(values):
         return values, None
     pairs = paired(names, values, options.pairs, option)
-    return to_complex(values, pairs), pairs
+    return to_complex(shifted(values, pairs, options.offset), pairs), pairs
+
+
+def _refuse_complex_offset(values: AnyArray, options: SourceOptions) -> None:
+    if options.offset and np.iscomplexobj(values):
+        raise UsageError(f"--offset {options.offset:g} goes with real numbers; these are complex")
 
 
 def _interleaved(columns: tuple[int, ...], pairs: Paired) -> tuple[int, ...]:
@@ -264,14 +437,14 @@ def _interleaved(columns: tuple[int, ...], pairs: Paired) -> tuple[int, ...]:
 
 
 def _from_arrays(
-    path: str | Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
+    path: Path, options: SourceOptions, row_counts: tuple[int, ...], asked: str
 ) -> RawFrames:
     kind = Path(path).suffix[1:].upper()
     of_text = ("columns", "reference_columns", "delimiter", "header_rows", "label", "pairs")
     _refuse(options, of_text, kind)
     arrays, where = read_arrays(path), str(path)
-    if options.voltage is None and list(arrays) == ["array"]:
-        options = replace(options, voltage="array")
+    if options.voltage is None and len(arrays) == 1:
+        options = replace(options, voltage=next(iter(arrays)))
     if options.voltage is None:
         raise UsageError(
             f"{where}: say with --voltage KEY which array holds the frames; it holds"
@@ -301,7 +474,16 @@ def _from_arrays(
     times = None
     if options.time is not None:
         times = _times(pick(arrays, options.time, "--time", where), f"{where}: {options.time}")
-    return _finish(voltage, reference, names, times, table, arrays, options)
+    _refuse_complex_offset(voltage, options)
+    shift = options.offset
+    return RawFrames(
+        voltage + shift if shift else voltage,
+        reference + shift if shift and reference is not None else reference,
+        names,
+        times,
+        table,
+        arrays,
+    )
 
 
 def _times(values: AnyArray, where: str) -> FloatArray:
@@ -310,17 +492,10 @@ def _times(values: AnyArray, where: str) -> FloatArray:
     return np.atleast_1d(values).ravel().astype(np.float64)
 
 
-def _finish(
-    voltage: AnyArray,
-    reference: AnyArray | None,
-    names: tuple[str, ...],
-    times: FloatArray | None,
-    table: IntArray | None,
-    arrays: Mapping[str, AnyArray],
-    options: SourceOptions,
-) -> RawFrames:
+def _finish(raw: RawFrames, options: SourceOptions) -> RawFrames:
     """Separate the untouched frames from the others, convert complex numbers to real ones, and
     scale everything."""
+    voltage, reference, names, times = raw.voltage, raw.reference, raw.names, raw.time_s
     if options.reference_frames is not None:
         if reference is not None:
             raise UsageError("--reference-frames does not go with another reference; name one")
@@ -330,27 +505,27 @@ def _finish(
         names = tuple(names[k] for k in rest) if names else ()
         times = None if times is None else times[rest]
     if np.iscomplexobj(voltage) or (reference is not None and np.iscomplexobj(reference)):
-        if options.complex_part is None:
+        part = options.complex_part or ("in-phase" if raw.in_volts else None)
+        if part is None:
             raise UsageError(
                 "the numbers are complex; say with --complex-part which part:"
                 f" {', '.join(COMPLEX_PARTS)}"
             )
         phase = _common_phase(voltage[:1] if reference is None else reference)
-        voltage = _part(voltage, options.complex_part, phase)
-        reference = None if reference is None else _part(reference, options.complex_part, phase)
+        voltage = _part(voltage, part, phase)
+        reference = None if reference is None else _part(reference, part, phase)
     elif options.complex_part is not None:
         raise UsageError(
             f"--complex-part {options.complex_part}: the numbers are real; leave it out, and where"
             " they are magnitudes say --sign magnitude"
         )
     factor = 1.0 if options.scale is None else options.scale
-    return RawFrames(
+    return replace(
+        raw,
         voltage=np.asarray(voltage, dtype=np.float64) * factor,
         reference=None if reference is None else np.asarray(reference, dtype=np.float64) * factor,
         names=names,
         time_s=times,
-        table=table,
-        arrays=arrays,
     )
 
 

@@ -4,6 +4,7 @@ detected, and bad cells are named."""
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,16 @@ from eitskin.frames.lines import (
     LineFormat,
     LineReader,
     Row,
+    lone_labels,
     own_labels,
     parse_cell,
 )
 
 MAX_BYTES = 1_000_000_000
-SNIFFED_LINES = 50
+SNIFFED_LINES = 1000
+SNIFFED_ROWS = 50
+CERTAIN_COUNT = 4  # cells that count up in a first line make it a header, whatever the shape
+INDEX_NAMES = ("", "index", "unnamed: 0")
 LONGEST = 200  # characters of a list in a message
 
 
@@ -42,6 +47,16 @@ class TextTable:
     @property
     def n_columns(self) -> int:
         return len(self.cells[0])
+
+    @property
+    def found(self) -> str:
+        """What was found in the file, for messages."""
+        label = "no label" if self.form.label is None else f"label {self.form.label!r}"
+        heads = f"{self.header_rows or 'no'} header row{'s' * (self.header_rows > 1)}"
+        return (
+            f"found: delimiter {self.form.delimiter}, {label}, {heads},"
+            f" {len(self.cells)} rows of {self.n_columns} cells"
+        )
 
     def numbers(self, columns: Sequence[int]) -> AnyArray:
         """Return the chosen ``columns`` as numbers, (rows, len(columns)): complex if a cell is like
@@ -76,10 +91,11 @@ def read_table(
     skip_bad_lines: bool = False,
     comment: tuple[str, ...] = COMMENT,
     cells: int | None = None,
+    fits: Sequence[int] = (),
 ) -> TextTable:
     """Read a text table. ``delimiter`` and ``label`` are as in ``LineFormat``; these and
     ``header_rows`` are detected if None. ``skip_bad_lines`` leaves out lines whose length differs
-    from most.
+    from most. ``fits`` are the lengths that a frame may have, which decide between guesses.
 
     Empty lines and lines that begin with # or % are ignored.
 
@@ -92,17 +108,20 @@ def read_table(
     if b"\0" in content[:4096]:
         raise FrameError(f"{path}: not a text table (it holds zero bytes); save it as CSV in UTF-8")
     lines = list(enumerate(decoded(content).splitlines(), 1))
-    given = LineFormat("comma" if delimiter is None else delimiter, label, comment)
-    form = _found_form([line for _, line in lines], delimiter is None, given, str(path))
+    form = _found_form([line for _, line in lines], delimiter, label, comment, fits, str(path))
     reader = LineReader(form)
     rows = [row for number, line in lines for row in reader.feed(number, line)] + reader.finish()
     if not rows:
-        labelled = "" if form.label is None else f" that begin with {form.label!r}"
-        raise FrameError(f"{path}: the table has no rows{labelled}")
+        raise FrameError(f"{path}: the table has no rows{_without_label(lines, form)}")
     notes = []
     if reader.passed_over:
         notes.append(f"{reader.passed_over} lines without the label {form.label!r} passed over")
-    skip = _header_length([row.cells for row in rows]) if header_rows is None else header_rows
+    skip = header_rows
+    if skip is None:
+        skip = _words_length([row.cells for row in rows])
+        if form.label is None and _counting_header([row.cells for row in rows[skip:]], fits):
+            notes.append(f"line {rows[skip].line} counts the columns and is taken for a header")
+            skip += 1
     body = _without_ends(rows[skip:])
     if not body:
         raise FrameError(
@@ -117,6 +136,7 @@ def read_table(
                 f"{path}: line {row.line} has {len(row.cells)} cells,"
                 f" {f'line {body[0].line} has' if cells is None else 'the layout says'} {width};"
                 " repair it, or leave such lines out with --skip-bad-lines"
+                f"{_labels_seen(lines, form)}"
             )
     names = rows[skip - 1].cells if skip else ()
     if len(names) == width + 1 and not names[-1]:
@@ -141,22 +161,100 @@ def decoded(content: bytes) -> str:
 
 
 def _found_form(
-    lines: Sequence[str], find_delimiter: bool, form: LineFormat, where: str
+    every: Sequence[str],
+    delimiter: str | None,
+    label: str | None,
+    comment: tuple[str, ...],
+    fits: Sequence[int],
+    where: str,
 ) -> LineFormat:
-    """Return ``form``, completed by what can be detected in the lines."""
-    lines = [line for line in lines if not form.passed_over(line)]
-    if form.label is None and (found := own_labels(lines)):
-        if len(found) > 1:
-            counted = ", ".join(f"{name!r} ({count})" for name, count in found.items())
-            raise UsageError(
-                f"{where}: lines begin with {_cut(counted)}; say with --label which are the frames"
-            )
-        form = replace(form, label=next(iter(found)))
-    if not find_delimiter:
-        return form
-    if form.label is not None:
-        lines = [rest for line in lines if (rest := form.labelled(line))]
-    return replace(form, delimiter=_sniffed(lines))
+    """Return the form in which the lines are most like a table of numbers: delimiter and label are
+    guessed together, unless they are given."""
+    given = LineFormat("comma" if delimiter is None else delimiter, label, comment)
+    lines = [line for line in every if not given.passed_over(line)]
+    labels: list[str | None] = [label]
+    if label is None and (own := own_labels(lines)):
+        labels = [_only(own, where)]
+    elif label is None and (alone := lone_labels(lines)):
+        labels = [None, *([next(iter(alone))] if len(alone) == 1 else [])]
+        if len(alone) > 1 and min(alone.values()) > 1:
+            labels = [_only(alone, where)]
+    delimiters = list(DELIMITERS) if delimiter is None else [delimiter]
+    forms = [replace(given, delimiter=d, label=word) for word in labels for d in delimiters]
+    if len(forms) == 1:
+        return forms[0]
+    sample = lines if len(lines) <= SNIFFED_LINES else lines[-SNIFFED_LINES:]
+    whole = len(sample) == len(lines)
+    scores = [_score(form, sample, fits, whole) for form in forms]
+    best = max(range(len(forms)), key=lambda k: scores[k])  # of equals the first
+    return forms[best] if sample else given
+
+
+def _only(labels: dict[str, int], where: str) -> str:
+    if len(labels) > 1:
+        counted = ", ".join(f"{name!r} ({count})" for name, count in labels.items())
+        raise UsageError(
+            f"{where}: lines begin with {_cut(counted)}; say with --label which are the frames"
+        )
+    return next(iter(labels))
+
+
+def _score(
+    form: LineFormat, lines: Sequence[str], fits: Sequence[int], whole: bool
+) -> tuple[float, bool, bool, int]:
+    """Return how much ``lines`` look like a table in ``form``: the share of cells that are numbers
+    in rows of one length, where rows above them without a letter count against it; whether frames
+    have a length that ``fits``; whether decimal commas stay whole; the number of cells."""
+    reader = LineReader(form)
+    rows = [row.cells for line in lines for row in reader.feed(0, line)] + [
+        row.cells for row in reader.finish()
+    ]
+    skip = _words_length(rows)
+    unread = sum(not any(map(str.isalpha, "".join(row))) for row in rows[:skip])
+    rows = rows[skip:]
+    if not rows:
+        return 0.0, False, False, 0
+    width, alike = Counter(map(len, rows)).most_common(1)[0]
+    last = [cell for row in rows[-SNIFFED_ROWS:] for cell in row]
+    numeric = sum(parse_cell(cell) is not None for cell in last) / max(len(last), 1)
+    heads = _counting_header(rows, fits)
+    fit = width in fits or (whole and len(rows) - heads in fits)
+    cut = form.delimiter == "comma" and _cuts_decimals(rows[-SNIFFED_ROWS:])
+    return round(alike / (len(rows) + unread) * numeric, 6), fit, not cut, len(last)
+
+
+def _cuts_decimals(rows: Sequence[Sequence[str]]) -> bool:
+    """Return whether rows of two whole numbers are rather one number with a decimal comma: the
+    second begins with 0, or always has the same three digits or more."""
+    if any(len(row) != 2 or not row[1].isdigit() for row in rows):
+        return False
+    if any(not row[0].lstrip("+-").isdigit() for row in rows):
+        return False
+    lengths = {len(row[1]) for row in rows}
+    leading = any(len(row[1]) > 1 and row[1].startswith("0") for row in rows)
+    return (
+        leading or any(row[0] == "-0" for row in rows) or (len(lengths) == 1 and min(lengths) > 2)
+    )
+
+
+def _without_label(lines: Sequence[tuple[int, str]], form: LineFormat) -> str:
+    if form.label is None:
+        return ""
+    shown = [line for _, line in lines if not form.passed_over(line)]
+    seen = own_labels(shown) | lone_labels(shown)
+    words = ", ".join(f"{name!r} ({count})" for name, count in seen.items())
+    found = f"lines begin with {_cut(words)}" if seen else "no line begins with a word"
+    if form.label in seen:
+        return f" of numbers after the label {form.label!r}; the delimiter is {form.delimiter}"
+    return f" that begin with {form.label!r}; {found}"
+
+
+def _labels_seen(lines: Sequence[tuple[int, str]], form: LineFormat) -> str:
+    alone = lone_labels([line for _, line in lines if not form.passed_over(line)])
+    if form.label is not None or not alone:
+        return ""
+    word, count = next(iter(alone.items()))
+    return f"; {count} lines {word!r} stand between: try  --label {word!r}"
 
 
 def _without_ends(rows: list[Row]) -> list[Row]:
@@ -221,25 +319,43 @@ def _cut(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST].rstrip(', ')}, ..."
 
 
-def _sniffed(lines: Sequence[str]) -> str:
-    """Return the delimiter that makes the most cells numbers, and then the most cells."""
-    sample = lines[-SNIFFED_LINES:]
-
-    def score(delimiter: str) -> tuple[float, float]:
-        rows = [LineFormat(delimiter).split(line) for line in sample]
-        cells = [cell for row in rows for cell in row]
-        even = sum(len(row) == len(rows[-1]) for row in rows) / len(rows)
-        return round(
-            even * sum(parse_cell(cell) is not None for cell in cells) / max(len(cells), 1), 6
-        ), len(cells)
-
-    return max(DELIMITERS, key=score) if sample else "comma"
-
-
-def _header_length(rows: Sequence[Sequence[str]]) -> int:
+def _words_length(rows: Sequence[Sequence[str]]) -> int:
     """Return how many rows at the start hold mostly words: less than half of their cells are
     numbers."""
     for k, cells in enumerate(rows):
         if 2 * sum(parse_cell(cell) is not None for cell in cells) >= max(len(cells), 1):
             return k
     return len(rows)
+
+
+def _counting_header(rows: Sequence[Sequence[str]], fits: Sequence[int]) -> bool:
+    """Return whether the first row only counts the columns, as pandas and spreadsheets write it: 0,
+    1, 2, ... or 1, 2, 3, ..., perhaps beside words.
+
+    A few columns count by chance, so then it is one row too many for a frame that must show it.
+    """
+    if len(rows) < 2 or not _counts_up(rows[0]):
+        return False
+    numbers = sum(parse_cell(cell) is not None for cell in rows[0])
+    if numbers >= CERTAIN_COUNT:
+        return not _counts_up(rows[1])
+    return len(rows) not in fits and len(rows) - 1 in fits
+
+
+def _counts_up(cells: Sequence[str]) -> bool:
+    """Return whether the numbers among ``cells`` are successive whole numbers; the first is 0 or 1
+    if there are few."""
+    values = [value for cell in cells if (value := parse_cell(cell)) is not None]
+    if not values or any(value.imag or value.real % 1 for value in values):
+        return False
+    if len(values) < CERTAIN_COUNT and values[0] not in (0, 1):
+        return False
+    return all(b - a == 1 for a, b in pairwise(values))
+
+
+def counting_column(table: TextTable) -> bool:
+    """Return whether the first column only counts the rows, as the index that pandas and
+    spreadsheets put before the numbers."""
+    column = [row[0] for row in table.cells]
+    unnamed = bool(table.header) and table.header[0].lower() in INDEX_NAMES
+    return len(column) > 1 - unnamed and table.n_columns > 1 and _counts_up(column)

@@ -39,20 +39,22 @@ def examine_case(subject: Subject) -> tuple[DoctorReport, Case]:
     """Return the report of ``examine``, and the case as the checks left it, for the picture."""
     cases: list[Case] = []
     finite = CheckOutcome()
-    for _, frames in subject.readings:
-        case, outcome = check_finite(_case(frames, subject))
+    for reading in subject.readings:
+        case, outcome = check_finite(_case(reading.frames, subject))
         finite = finite if cases else outcome
         cases.append(case)
     outcomes = [finite]
-    orders = tuple(order for order, _ in subject.readings)
     if finite.findings and finite.findings[-1].name == "no-signal":
         return _report(subject, cases[0], outcomes), cases[0]
-    chosen = choose_order(orders, tuple(cases), subject.given)
+    chosen = choose_order(subject.readings, tuple(cases), subject)
+    if any(finding.name == "differences" for finding in chosen.outcome.findings):
+        outcomes.append(chosen.outcome)
+        return _report(subject, chosen.case, outcomes), chosen.case
     pattern = check_pattern(cases[0], chosen)
     if pattern.findings:
         outcomes += [pattern, check_noise(cases[0])]
         return _report(subject, cases[0], outcomes), cases[0]
-    case, numbering = check_numbering(cases[chosen.best])
+    case, numbering = check_numbering(chosen.case)
     case, swaps = check_swaps(case)
     outcomes += [chosen.outcome, replace(numbering, inconclusive=()), swaps, check_frames(case)]
     case, sign = check_sign(case)

@@ -31,5 +31,9 @@ def check_finite(case: Case) -> tuple[Case, CheckOutcome]:
     trusted = case.trusted & ~bad_untouched.any(axis=0)
     if rms(case.reference[trusted]) == 0:
         text = "the reference frame is zero everywhere: no current, or a wrong array"
+        changed = rms(np.where(np.isfinite(frames), frames, 0.0).ravel()) > 0
+        if changed:
+            text += "; if the frames are differences from a reference already, say --differences"
+            text += " and --skin FILE, and name no reference"
         findings.append(Finding("no-signal", FAULT, text))
     return replace(case, trusted=trusted), CheckOutcome(tuple(findings))

@@ -1,5 +1,6 @@
 """The order and the sign of the rows. Each hypothesis is compared with the homogeneous frame."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -7,8 +8,14 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.frames.doctor.case import SAME, Case, cosine, numbers, rms
+from eitskin.frames.doctor.meaning import (
+    constant_in,
+    differences_outcome,
+    offset_outcome,
+    without_constant,
+)
 from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
-from eitskin.frames.doctor.subject import AS_GIVEN
+from eitskin.frames.doctor.subject import AS_GIVEN, POTENTIALS_ORDERS, Reading, Subject
 from eitskin.frames.doctor.swaps import likeness
 
 BETTER_BY = 0.1
@@ -18,52 +25,88 @@ MIXED_SHARE = 0.1
 UNLIKE = 0.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OrderChoice:
-    """The order whose magnitudes follow the prediction best, its correlation ``likeness``, and the
-    outcome for the report."""
+    """The reading whose magnitudes follow the prediction best, its case, its correlation
+    ``likeness``, and the outcome for the report."""
 
     best: int
+    case: Case
     outcome: CheckOutcome
     likeness: float = 1.0
 
 
-def choose_order(orders: tuple[str, ...], cases: tuple[Case, ...], given: str) -> OrderChoice:
-    """Compare one case per order, by the correlation of |reference| with |homogeneous prediction|.
+def choose_order(
+    readings: Sequence[Reading], cases: tuple[Case, ...], subject: Subject
+) -> OrderChoice:
+    """Compare one case per reading, by the correlation of |reference| with |homogeneous
+    prediction|.
 
-    If no order reaches LIKELY, exchanged wires or a dead electrode may hide the right one; then the
-    correlations without these faults are compared. An order other than ``given`` is reported if its
-    correlation is at least LIKELY and better by more than BETTER_BY.
+    If no reading reaches LIKELY, a constant in all numbers, frames that are differences, exchanged
+    wires or a dead electrode may hide the right one, and are tried in this order. A reading other
+    than the given one is reported if its correlation is at least LIKELY and better by more than
+    BETTER_BY.
     """
-    own = orders.index(given) if given in orders else -1
+    names = tuple(reading.name for reading in readings)
+    own = names.index(subject.given) if subject.given in names else -1
     size = np.abs(cases[0].predicted)
     if own >= 0 and np.ptp(size) <= SAME * size.max():
         return OrderChoice(
             own,
+            cases[own],
             CheckOutcome(
                 inconclusive=("the channel order: the protocol makes all channels alike",)
             ),
         )
     reached = [likeness(case, allow_fault=False) for case in cases]
-    if max(reached) < LIKELY:
+    offset: CheckOutcome | None = None
+    constants = [
+        constant_in(case, reading.sign) for case, reading in zip(cases, readings, strict=True)
+    ]
+    found = int(np.argmax([one.correlation for one in constants]))
+    if (max(reached) < LIKELY and constants[found].convincing) or constants[found].surely:
+        cases = tuple(
+            without_constant(case, one) for case, one in zip(cases, constants, strict=True)
+        )
+        offset = offset_outcome(constants[found], subject)
+        reached = [one.correlation for one in constants]
+    elif max(reached) < LIKELY:
+        if (differences := differences_outcome(cases, names)) is not None:
+            best, outcome = differences
+            return OrderChoice(best, cases[best], _joined(outcome, readings[best]))
         reached = [likeness(case, allow_fault=True) for case in cases]
     best = int(np.argmax(reached))
     evidence: dict[str, Any] = {
-        name: round(value, 4) for name, value in zip(orders, reached, strict=True)
+        name: round(value, 4) for name, value in zip(names, reached, strict=True)
     }
     measured: dict[str, Any] = {"order_correlation": evidence}
+    findings = () if offset is None else offset.findings
     if own >= 0 and (best == own or reached[best] < max(reached[own] + BETTER_BY, LIKELY)):
-        return OrderChoice(own, CheckOutcome(measured=measured), max(reached))
+        outcome = CheckOutcome(findings, measured=measured)
+        return OrderChoice(own, cases[own], outcome, max(reached))
     why = "by their number" if own < 0 else "by correlation with the homogeneous frame"
-    named = "the order given" if given == AS_GIVEN else f"{given}"
-    finding = Finding(
-        "order",
-        FAULT,
-        f"{why} the channels stand in {orders[best]} order, not in {named}",
-        {"correlation": evidence},
-        f"--order {orders[best]}",
-    )
-    return OrderChoice(best, CheckOutcome((finding,), measured=measured), max(reached))
+    named = "the order given" if subject.given == AS_GIVEN else f"{subject.given}"
+    reading = readings[best]
+    if reading.name in POTENTIALS_ORDERS:
+        kind, text = (
+            "potentials",
+            (
+                f"{why} the channels are the potentials of single electrodes against ground, not"
+                " voltages between two"
+            ),
+        )
+    else:
+        kind, text = "order", f"{why} the channels stand in {reading.name} order, not in {named}"
+    finding = Finding(kind, FAULT, text, {"correlation": evidence}, reading.repair)
+    outcome = CheckOutcome((finding, *findings), measured=measured)
+    return OrderChoice(best, cases[best], outcome, max(reached))
+
+
+def _joined(outcome: CheckOutcome, reading: Reading) -> CheckOutcome:
+    """Return the outcome with the options of ``reading`` in its repair."""
+    finding = outcome.findings[0]
+    repair = f"{reading.repair} {finding.repair}".strip()
+    return replace(outcome, findings=(replace(finding, repair=repair),))
 
 
 def check_frames(case: Case) -> CheckOutcome:

@@ -4,6 +4,7 @@ measured numbers."""
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite
+from shlex import quote
 from typing import Any
 
 from eitskin.config import first_few
@@ -45,7 +46,7 @@ class DoctorReport:
     """The report on ``source``; ``subject`` describes what was examined.
 
     ``repair`` holds the options of ``eitskin import`` that together repair everything that can be
-    repaired.
+    repaired, and ``command`` the whole command that applies them, if it is known.
     """
 
     source: str
@@ -54,6 +55,7 @@ class DoctorReport:
     inconclusive: tuple[str, ...]
     measured: Mapping[str, Any]
     repair: str = ""
+    command: str = ""
 
     @property
     def healthy(self) -> bool:
@@ -77,6 +79,7 @@ class DoctorReport:
             "untold": list(self.inconclusive),
             "measured": _finite(self.measured),
             "repair": self.repair,
+            "command": self.command,
         }
 
     def lines(self) -> list[str]:
@@ -104,7 +107,8 @@ class DoctorReport:
             + ("nothing must be repaired" if self.healthy else "repair these before imaging")
         )
         if self.repair:
-            lines.append(f"  all in one: eitskin import {self.source} -o OUT.npz ... {self.repair}")
+            known = f"eitskin import {quote(self.source)} -o OUT.npz ... {self.repair}"
+            lines.append(f"  all in one: {self.command or known}")
         return lines
 
 

@@ -10,7 +10,7 @@ from eitskin.device.wire.explain import fault_text
 from eitskin.device.wire.link_table import FaultCode
 from eitskin.device.wire.packets import ELECTRODE_FAULTS, BoardInfo, BoardStats, Fault
 from eitskin.frames.doctor.report import FAULT, NOTE, DoctorReport, Finding
-from eitskin.frames.doctor.subject import AS_GIVEN, Subject
+from eitskin.frames.doctor.subject import AS_GIVEN, Reading, Subject
 from eitskin.session.checks.raw_frames import RawRun, as_frames, collect
 from eitskin.session.set_up import begin_scene
 from eitskin.skin.skin import Skin
@@ -70,7 +70,16 @@ def board_subject(
         "reciprocity of every row: the board measures one of each pair; scan fully with"
         "  eitskin stream --full",
     )  # fmt: skip
-    return Subject(device.transport.url, AS_GIVEN, ((AS_GIVEN, frames),), skin, remarks)
+    able = device.transport.capabilities
+    return Subject(
+        device.transport.url,
+        AS_GIVEN,
+        (Reading(AS_GIVEN, frames),),
+        skin,
+        remarks,
+        offset=able.offset,
+        scale=able.scale,
+    )
 
 
 def board_findings(report: DoctorReport, measured: MeasuredBoard) -> DoctorReport:
