@@ -119,7 +119,13 @@ def _teacher(options: argparse.Namespace) -> Teacher | None:
         return None
 
     presses = options.presses or options.folder / "presses.npz"
-    refuse_unwritable(presses)
+    if options.presses is None and presses.exists():
+        say(f"--teach continues {presses}; name another file with  --presses FILE")
+    try:
+        refuse_unwritable(presses)
+    except FileError as error:
+        hint = "" if options.presses else "; the presses go there unless you say  --presses FILE"
+        raise FileError(f"{error}{hint}") from None
     skin, text = None, ""
     if options.skin is not None:
         skin = load_skin(options.skin)[0]

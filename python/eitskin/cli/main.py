@@ -43,6 +43,7 @@ FIRST = "eitskin stream --device sim:swipe"
 INVALID_CHOICE = re.compile(  # argparse's text, with quotes before Python 3.12
     r"argument (?P<what>.*?): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)"
 )
+UNKNOWN = re.compile(r"unrecognized arguments: (?:.* )?(?P<option>--[\w-]+)")
 REPLACED = re.compile(r"unrecognized arguments: .*--(budget|accuracy)\b")
 ENTRY_POINT_GROUP = "eitskin.commands"  # commands of other packages
 STUDIES = ("bench", "compare", "dataset", "draw", "study", "tradeoff")  # in eitskin-studies
@@ -59,10 +60,25 @@ class Parser(argparse.ArgumentParser):
             known = re.findall(r"'([^']+)'", found["known"]) or found["known"].split(", ")
             message = f"{found['what']}: {found['given']!r} is unknown; "
             message += nearest(found["given"], known)
+        unknown = UNKNOWN.match(message)
+        if unknown and not REPLACED.match(message):
+            known = [word for word in _options_of(self) if word.startswith("--")]
+            close = nearest(unknown["option"], known)
+            message += f"; {close}" if close.startswith("did you mean") else ""
         if REPLACED.match(message):
             message += "; use --preset, or a model of  eitskin recommend -o MODEL.eitm"
         see = " See" if message.endswith("?") else "; see"
         raise UsageError(f"{message}{see}  {self.prog} --help")
+
+
+def _options_of(parser: argparse.ArgumentParser) -> list[str]:
+    """Return the options of ``parser`` and of the commands whose options are loaded."""
+    words: list[str] = []
+    for action in parser._actions:
+        words += action.option_strings
+        if isinstance(action, argparse._SubParsersAction):
+            words += [word for one in set(action.choices.values()) for word in _options_of(one)]
+    return words
 
 
 def build_parser(only: str | None = None) -> argparse.ArgumentParser:

@@ -49,6 +49,11 @@ def no_answer(link: Link, before: LinkCounters, what: str, waited_s: float) -> s
         )
     if link.ended and what == "TARE":
         return f"{name}: the scene is over, and a tare waits for frames; open the device again"
+    if link.transport.capabilities.instrument:
+        return (
+            f"{name}: {what} is not answered within {waited_s:g} s, as the instrument sends too few"
+            " frames; see whether it still sends lines of its layout, and check its cable and power"
+        )
     if packets:
         return (
             f"{name}: packets arrive, but {what} is not answered within {waited_s:g} s; reset the"

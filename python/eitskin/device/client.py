@@ -9,6 +9,7 @@ from eitskin.core.options_table import CHOICES
 from eitskin.core.results import Options, check_options
 from eitskin.device.exchange import ANSWER_S, CommandExchange
 from eitskin.device.link import Streamed
+from eitskin.device.pacing import Pacer
 from eitskin.device.streaming import LEAVE_S, packet_stream
 from eitskin.device.upload import upload
 from eitskin.device.wire import link_table as commands
@@ -37,7 +38,9 @@ def check_tare_frames(frames: int) -> int:
 
 class Device(CommandExchange):
     """All commands and questions that a board takes; ``open_device`` makes one from a URL. Raises
-    as ``CommandExchange``."""
+    as ``CommandExchange``. ``pacer`` holds frames back as ``?speed=`` of the URL says."""
+
+    pacer: Pacer | None = None
 
     # ---- commands ----
 
@@ -224,6 +227,9 @@ class Device(CommandExchange):
             while not packets.over:
                 item = packets.next(None)
                 if item is not None:
+                    time_us = getattr(getattr(item, "solved", item), "time_us", None)
+                    if time_us is not None and self.pacer is not None:
+                        self.pacer.hold(time_us)
                     yield item
         except KeyboardInterrupt:
             packets.stop(LEAVE_S)

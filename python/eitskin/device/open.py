@@ -11,6 +11,7 @@ from eitskin.config import nearest
 from eitskin.device.check import check_model
 from eitskin.device.client import Device
 from eitskin.device.link import Reconnect
+from eitskin.device.pacing import Pacer
 from eitskin.device.ports import BAUD, Port, SerialTransport, only_board, ports
 from eitskin.device.source import open_source, source_schemes
 from eitskin.device.timing import split_timing
@@ -52,6 +53,7 @@ def open_device(
             emulator that it names.
     """
     device = Device(open_transport(url, model=model, image=image), room=room, reconnect=reconnect)
+    device.pacer = Pacer(split_timing(url)[1].speed or 0.0)
     if model is not None and device.board.has_model:
         from eitskin.model.eitm import decode_model
 

@@ -131,7 +131,9 @@ class SourceTransport(Transport):
     @property
     def capabilities(self) -> Capabilities:
         source = self.source
-        return Capabilities(own_clock=source.synchronous, offset=source.offset, scale=source.scale)
+        return Capabilities(
+            own_clock=source.synchronous, offset=source.offset, scale=source.scale, instrument=True
+        )
 
     @property
     def ended(self) -> bool:  # type: ignore[override]

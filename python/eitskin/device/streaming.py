@@ -216,6 +216,11 @@ class BoardPackets:
                 return True  # it has sent all that was asked for, and some of it was lost
             self._resume()
         elif self._silences >= SILENCES:
+            if device.transport.capabilities.instrument:
+                raise DeviceError(
+                    f"{device.transport.name}: the instrument sends no frame any more; see whether"
+                    " it still sends lines of its layout, and check its cable and power"
+                )
             faults = ", ".join(code.name.lower().replace("_", " ") for code in now.fault_codes)
             raise DeviceError(
                 f"{device.transport.name}: the board answers but sends no frame; it reports"

@@ -40,6 +40,7 @@ class Capabilities:
         scene: what a simulated skin is shown; None before a real one.
         offset, scale: an instrument's own number is a voltage after ``offset`` was added to it and
             it was multiplied by ``scale``.
+        instrument: the frames come from another instrument, which no command can reset.
     """
 
     own_clock: bool = False
@@ -49,6 +50,7 @@ class Capabilities:
     scene: SimulatedScene | None = None
     offset: float = 0.0
     scale: float = 1.0
+    instrument: bool = False
 
 
 @dataclass(frozen=True)

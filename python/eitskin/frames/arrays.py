@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.arrays import AnyArray
+from eitskin.config import first_few
 from eitskin.errors import EitskinError, FileError, FrameError
 from eitskin.fileio import read_bytes, read_mat
 
@@ -17,7 +18,19 @@ MAX_UNPACKED_BYTES = 4_000_000_000
 INNOCENT_BYTES = 100_000_000  # up to this size any compression ratio is accepted
 MAX_RATIO = 300  # unpacked over packed size; masks of a truth reach 100, zeros reach 1000
 LISTED = 40
+PICKLED = "an array of pickled Python objects; save it as numbers:  np.savez(..., v=np.stack(v))"
+CELL = "a cell array; save it as numbers:  v = cell2mat(v); save('-v7', ...)"
+STRUCTS = "an array of structs; save it as numbers:  v = [v.meas]; save('-v7', ...)"
 MAX_BYTES = 1_000_000_000
+
+
+class NamedArrays(dict[str, AnyArray]):
+    """The arrays of a file by name. ``others`` are the names of everything else in it, with what
+    it is and what to do about it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.others: dict[str, str] = {}
 
 
 def read_npz(
@@ -25,12 +38,12 @@ def read_npz(
     what: str,
     wanted: Collection[str] | None = None,
     most_bytes: int = MAX_UNPACKED_BYTES,
-) -> dict[str, AnyArray]:
+) -> NamedArrays:
     """Return the arrays of an .npz by name, without pickle; ``what`` names the kind of file in
     errors.
 
-    Arrays of objects are left out. Only ``wanted`` arrays are unpacked (None: all); the others come
-    out empty. At most ``most_bytes`` are unpacked.
+    Arrays of objects are named in ``others``. Only ``wanted`` arrays are unpacked (None: all); the
+    rest come out empty. At most ``most_bytes`` are unpacked.
 
     Raises:
         FileError: the file cannot be read, is damaged, or would unpack to too much.
@@ -41,7 +54,7 @@ def read_npz(
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise FileError(f"{path}: one bare array (.npy), not an .npz with named arrays")
             _refuse_inflating(archive, str(path), most_bytes)
-            arrays = {}
+            arrays = NamedArrays()
             for name in archive.files:
                 if wanted is not None and name not in wanted:
                     arrays[name] = np.zeros(0)
@@ -51,6 +64,7 @@ def read_npz(
                 except ValueError as error:
                     if "allow_pickle" not in str(error):
                         raise
+                    arrays.others[name] = PICKLED
             return arrays
     except EitskinError:
         raise
@@ -76,13 +90,17 @@ def _refuse_inflating(archive: Any, where: str, most_bytes: int) -> None:
         )
 
 
-def read_arrays(path: str | Path) -> dict[str, AnyArray]:
+def read_arrays(path: str | Path) -> NamedArrays:
     """Return all arrays of a file by name. The array of an .npy is called "array"; the fields of a
     struct in a .mat are called "struct.field"."""
     suffix = Path(path).suffix.lower()
     if suffix == ".npz":
         return read_npz(path, "file of arrays")
-    return {"array": _read_npy(path)} if suffix == ".npy" else _read_mat(path)
+    if suffix != ".npy":
+        return _read_mat(path)
+    arrays = NamedArrays()
+    arrays["array"] = _read_npy(path)
+    return arrays
 
 
 def pick(arrays: Mapping[str, AnyArray], key: str, option: str, where: str) -> AnyArray:
@@ -91,8 +109,21 @@ def pick(arrays: Mapping[str, AnyArray], key: str, option: str, where: str) -> A
     Raises:
         FrameError: there is no such array.
     """
+    others = arrays.others if isinstance(arrays, NamedArrays) else {}
+    if key in others:
+        raise FrameError(f"{where}: {key!r} for {option} is {others[key]}")
+    inside = [name for name in (*arrays, *others) if name.startswith(f"{key}.")]
+    if inside:
+        raise FrameError(
+            f"{where}: {key!r} for {option} is a struct; name one of its fields:"
+            f" {first_few(inside, LISTED)}"
+        )
     if key not in arrays:
-        raise FrameError(f"{where}: no array {key!r} for {option}; it holds {listing(arrays)}")
+        kinds = ", ".join(f"{name} ({kind.partition(';')[0]})" for name, kind in others.items())
+        raise FrameError(
+            f"{where}: no array {key!r} for {option}; it holds {listing(arrays)}"
+            + (f"; not as numbers: {kinds}" if kinds else "")
+        )
     return arrays[key]
 
 
@@ -113,17 +144,26 @@ def _read_npy(path: str | Path) -> AnyArray:
         ) from None
 
 
-def _read_mat(path: str | Path) -> dict[str, AnyArray]:
-    arrays: dict[str, AnyArray] = {}
+def _read_mat(path: str | Path) -> NamedArrays:
+    arrays = NamedArrays()
     _flatten(read_mat(path), "", arrays)
     return arrays
 
 
-def _flatten(content: Mapping[str, Any], prefix: str, arrays: dict[str, AnyArray]) -> None:
+def _flatten(content: Mapping[str, Any], prefix: str, arrays: NamedArrays) -> None:
     for name, value in content.items():
         if isinstance(value, Mapping):
             _flatten(value, f"{prefix}{name}.", arrays)
             continue
-        array = np.asarray(value)
+        if hasattr(value, "toarray"):
+            value = value.toarray()  # a sparse matrix
+        try:
+            array = np.asarray(value)
+        except ValueError:  # cells of unlike sizes
+            array = np.asarray(None)
         if array.dtype != object:
             arrays[f"{prefix}{name}"] = array
+        else:
+            items = value if isinstance(value, (list, np.ndarray)) else []
+            structs = len(items) > 0 and all(isinstance(one, Mapping) for one in np.ravel(items))
+            arrays.others[f"{prefix}{name}"] = STRUCTS if structs else CELL

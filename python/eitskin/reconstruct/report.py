@@ -29,9 +29,9 @@ def to_text(outcome: ReconstructOutcome) -> str:
         facts = summary(scores)
         lines.append(
             f"compared with the truth of {facts['frames']} frames: {facts['found']} of"
-            f" {facts['true']} touches found, {facts['false']} false; position error median"
-            f" {facts['position_median_mm']:.2f} mm, worst {facts['position_worst_mm']:.2f} mm;"
-            f" MIoU image {facts['miou_image']:.3f}, touches {facts['miou_touches']:.3f}"
+            f" {facts['true']} touches found, {facts['false']} false;"
+            + _position_errors(facts)
+            + f" MIoU image {facts['miou_image']:.3f}, touches {facts['miou_touches']:.3f}"
         )
     return "\n".join(lines)
 
@@ -63,6 +63,13 @@ def _lines(
         )
     if info.diagnostics:
         yield f"{'':11} diagnostics: {'; '.join(info.found)}"
+
+
+def _position_errors(facts: dict[str, Any]) -> str:
+    if not facts["found"]:
+        return ""
+    median, worst = facts["position_median_mm"], facts["position_worst_mm"]
+    return f" position error median {median:.2f} mm, worst {worst:.2f} mm;"
 
 
 def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:

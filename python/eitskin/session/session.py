@@ -21,6 +21,7 @@ from eitskin.device.exchange import OTHERS
 from eitskin.device.known_model import KnownModel, find_model, need_model
 from eitskin.device.link import Reconnect
 from eitskin.device.open import open_with_files
+from eitskin.device.pacing import Pacer, Slowness, WallClock
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.streaming import LEAVE_S, STOP_S, packet_stream
@@ -32,7 +33,6 @@ from eitskin.session.frame import DriveReport, Frame, Message, Notice
 from eitskin.session.gestures import StreamGestures
 from eitskin.session.notices import Novelty, notice_of
 from eitskin.session.observer import Observer
-from eitskin.session.pacing import Pacer, Slowness, WallClock
 from eitskin.session.reference import ReferenceMean
 from eitskin.session.replay import Replay
 from eitskin.session.requests import Requests

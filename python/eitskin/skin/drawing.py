@@ -26,10 +26,12 @@ JOIN_MM = 0.01  # two ends of lines that are closer than this are the same point
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """The shapes that a file draws; ``where`` names the file in errors."""
+    """The shapes that a file draws; ``where`` names the file in errors, and ``left_out`` what it
+    holds besides, such as "; 2 hidden shapes were left out"."""
 
     where: str
     shapes: tuple[DrawnShape, ...]
+    left_out: str = ""
 
     def marked(self, mark: str) -> tuple[DrawnShape, ...]:
         """Return the shapes that ``mark`` names by id, class, layer or group, and those whose id is
@@ -43,7 +45,9 @@ class Drawing:
             one for one in self.shapes if mark in one.names or numbered.fullmatch(one.name)
         )
         if not found:
-            raise ConfigError(f"{self.where}: nothing is marked {mark!r}; {self._known()}")
+            raise ConfigError(
+                f"{self.where}: nothing is marked {mark!r}; {self._known()}{self.left_out}"
+            )
         return found
 
     def outline(self, element: str | None = None, mark: str | None = None) -> Outline:
@@ -60,13 +64,23 @@ class Drawing:
         if element is not None:
             shapes = [one for one in shapes if element in one.names]
             if not shapes:
-                raise ConfigError(f"{self.where}: nothing is named {element!r}; {self._known()}")
+                raise ConfigError(
+                    f"{self.where}: nothing is named {element!r}; {self._known()}{self.left_out}"
+                )
         closed = [one for one in shapes if one.closed] + joined(
             [one for one in shapes if not one.closed]
         )
         if not closed:
             raise GeometryError(
                 f"{self.where}: no closed outline among {len(shapes)} shapes; close the rim's line"
+                f"{self.left_out}"
+            )
+        if len(closed) > 1 and len({one.part_of for one in closed} - {None}) == 1:
+            name = next(iter(sorted(closed[0].names)), "") if element is None else element
+            raise GeometryError(
+                f"{self.where}: {f'{name!r} itself' if name else 'the only shape'} has"
+                f" {len(closed)} closed parts, but a skin has one rim and no holes; split the path"
+                " (in Inkscape: Path, Break Apart), and name the outer part with element = ..."
             )
         if len(closed) > 1:
             raise GeometryError(
@@ -98,10 +112,12 @@ def read_drawing(path: Path, reading: DrawingReading) -> Drawing:
         from eitskin.skin.drawing_svg import read_svg as read
     else:
         from eitskin.skin.drawing_dxf import read_dxf as read
-    shapes = read(content, str(path), reading)
+    shapes, left_out = read(content, str(path), reading)
     if not shapes:
-        raise ConfigError(f"{path}: nothing is drawn in it; draw the rim as one closed line")
-    return Drawing(str(path), tuple(shapes))
+        raise ConfigError(
+            f"{path}: nothing is drawn in it; draw the rim as one closed line{left_out}"
+        )
+    return Drawing(str(path), tuple(shapes), left_out)
 
 
 def joined(open_shapes: Sequence[DrawnShape]) -> list[DrawnShape]:

@@ -4,6 +4,7 @@ model space, in mm."""
 import io
 import logging
 import math
+from collections import Counter
 from collections.abc import Iterator
 from itertools import islice
 from typing import Any
@@ -34,8 +35,9 @@ UNITS_MM = {1: 25.4, 2: 304.8, 4: 1.0, 5: 10.0, 6: 1000.0, 9: 0.0254, 13: 1e-3, 
 DRAWN = {"LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE"}
 
 
-def read_dxf(content: bytes, where: str, reading: DrawingReading) -> list[DrawnShape]:
-    """Return every line and point of the DXF file ``content``; blocks are expanded."""
+def read_dxf(content: bytes, where: str, reading: DrawingReading) -> tuple[list[DrawnShape], str]:
+    """Return every line and point of the DXF file ``content``, and words for the entities that are
+    neither; blocks are expanded."""
     talk = logging.getLogger("ezdxf")
     before = talk.level
     talk.setLevel(logging.CRITICAL)  # the user need not see what ezdxf repairs in a file
@@ -45,9 +47,10 @@ def read_dxf(content: bytes, where: str, reading: DrawingReading) -> list[DrawnS
         _refuse_copies(document, where)
         entities = list(ezdxf.disassemble.recursive_decompose(document.modelspace()))
         tolerance = reading.tolerance_mm / scale
-        return limited(
+        shapes = limited(
             (one for entity in entities for one in _shapes(entity, scale, tolerance)), where
         )
+        return shapes, _left_out(document, entities)
     except EitskinError:
         raise
     except Exception as error:  # ezdxf raises many kinds of errors for a damaged file
@@ -56,6 +59,28 @@ def read_dxf(content: bytes, where: str, reading: DrawingReading) -> list[DrawnS
         ) from None
     finally:
         talk.setLevel(before)
+
+
+def _left_out(document: Any, entities: list[Any]) -> str:
+    """Return words for entities that are no lines, and for those in paper space."""
+    other = Counter(one.dxftype() for one in entities if one.dxftype() not in (*DRAWN, "POINT"))
+    paper = Counter(
+        one.dxftype()
+        for layout in document.layouts
+        if not layout.is_modelspace
+        for one in layout
+        if one.dxftype() != "VIEWPORT"
+    )
+    said = ""
+    if other:
+        said += f"; left out: {_counted(other)}, of which only outlines as lines count"
+    if paper:
+        said += f"; left out: {_counted(paper)} in paper space, move them to model space"
+    return said
+
+
+def _counted(kinds: Counter[str]) -> str:
+    return ", ".join(f"{count} {kind}" for kind, count in kinds.most_common(5))
 
 
 def _scale_of(document: Any, where: str) -> float:

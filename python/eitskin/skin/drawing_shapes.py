@@ -23,13 +23,14 @@ class DrawnShape:
     a closed shape does not repeat the first.
 
     ``name`` is the shape's own id, or empty; ``names`` also holds its classes, its layer, and the
-    names of the groups around it.
+    names of the groups around it. ``part_of`` is the same number for all parts of one path.
     """
 
     name: str
     names: frozenset[str]
     points_mm: FloatArray
     closed: bool
+    part_of: int | None = None
 
     @property
     def middle_mm(self) -> FloatArray:

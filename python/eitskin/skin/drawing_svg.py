@@ -5,7 +5,7 @@ import io
 import math
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +39,9 @@ WORD = re.compile(r"[A-Za-z]|[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 # which is slow: it counts as LOOSE_WORDS words.
 LOOSE, LOOSE_WORDS = re.compile(r"[zZ](?!\s*(?:[mM]|$))"), 400
 MAX_WORDS = 40_000
+SHOWING = ("display", "visibility", "opacity")
+NOT_SHOWN = re.compile(r"(?:^|;)(?:display:none|opacity:0*\.?0*%?);")
+HIDDEN = re.compile(r"(?:^|;)(?:display:none|opacity:0*\.?0*%?|visibility:(?:hidden|collapse));")
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
@@ -52,8 +55,8 @@ class SvgPage:
     bottom: float
 
 
-def read_svg(content: bytes, where: str, reading: DrawingReading) -> list[DrawnShape]:
-    """Return every shape of the SVG file ``content``."""
+def read_svg(content: bytes, where: str, reading: DrawingReading) -> tuple[list[DrawnShape], str]:
+    """Return every visible shape of the SVG file ``content``, and words for what is hidden."""
     try:
         root = ET.fromstring(content)
     except (ET.ParseError, ValueError, LookupError) as error:
@@ -68,7 +71,10 @@ def read_svg(content: bytes, where: str, reading: DrawingReading) -> list[DrawnS
         root.attrib.pop(key, None)
     try:
         tree = svgelements.SVG.parse(io.BytesIO(ET.tostring(root)), reify=True, ppi=96.0)
-        return limited(_shapes(tree, frozenset(), page, reading.tolerance_mm), where)
+        shapes = limited(_shapes(tree, frozenset(), page, reading.tolerance_mm), where)
+        hidden = sum(HIDDEN.search(_style_of(one)) is not None for one in root.iter())
+        said = f"; {hidden} hidden shapes or groups were left out: show what is meant"
+        return shapes, said if hidden else ""
     except EitskinError:
         raise
     except Exception as error:  # the parser defines no error type; damage raises many kinds
@@ -161,10 +167,14 @@ def _refuse_copies(root: ET.Element, where: str) -> None:
 def _shapes(
     one: Any, around: frozenset[str], page: SvgPage, tolerance_mm: float
 ) -> Iterator[DrawnShape]:
-    attributes = one.values.get("attributes", {}) if isinstance(one.values, dict) else {}
-    if attributes.get("display") == "none" or "display:none" in str(
-        attributes.get("style", "")
-    ).replace(" ", ""):
+    values = one.values if isinstance(one.values, dict) else {}
+    attributes = values.get("attributes", {})
+    if NOT_SHOWN.search(_style(attributes)):
+        return
+    if isinstance(one, svgelements.Shape) and str(values.get("visibility")) in (
+        "hidden",
+        "collapse",
+    ):
         return
     own = {attributes.get("id"), attributes.get(LABEL), *str(attributes.get("class", "")).split()}
     names = around | {str(name) for name in own if name}
@@ -178,8 +188,22 @@ def _shapes(
                 np.ptp(points, axis=0).max()
             )
             yield DrawnShape(
-                str(attributes.get("id") or ""), names, points[:-1] if closed else points, closed
+                str(attributes.get("id") or ""),
+                names,
+                points[:-1] if closed else points,
+                closed,
+                id(one),
             )
+
+
+def _style_of(one: ET.Element) -> str:
+    return _style({str(key): value for key, value in one.attrib.items()})
+
+
+def _style(attributes: Mapping[str, Any]) -> str:
+    """Return what an element says of its own visibility, in the form of a style without blanks."""
+    own = [f"{key}:{attributes[key]}" for key in SHOWING if attributes.get(key) is not None]
+    return ";".join([*own, str(attributes.get("style", ""))]).replace(" ", "") + ";"
 
 
 def _runs(path: Any, tolerance: float) -> Iterator[list[tuple[float, float]]]:

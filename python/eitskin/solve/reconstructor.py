@@ -62,6 +62,11 @@ class Reconstructor:
         options: Options | None = None,
         blob: bytes | None = None,
     ) -> None:
+        if not isinstance(model, Model):
+            raise UsageError(
+                f"Reconstructor({model!r}): not a model; write  Reconstructor("
+                "eitskin.load_model(PATH)) , or without PATH for the prebuilt one"
+            )
         if engine not in ENGINES:
             raise UsageError(f"engine {engine!r} is not known; use one of {', '.join(ENGINES)}")
         self.model, self.engine = model, engine

@@ -1,0 +1,159 @@
+"""Messages name what is there, and what to do about it; printed commands can be pasted."""
+
+import shlex
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import eitskin
+from eitskin.cli.main import main
+from eitskin.device.open import open_device
+from eitskin.errors import EitskinError, FrameError, UsageError
+from eitskin.frames.arrays import pick, read_arrays
+from eitskin.frames.frames import save_frames
+from eitskin.skin.drawing import read_drawing
+from eitskin.skin.drawing_shapes import DrawingReading
+from small_models import session
+
+RING = "M10 10H110V110H10Z M45 45H75V75H45Z"
+SQUARE = "M10 10H110V110H10Z"
+HIDDEN = {
+    "attribute": 'display="none"',
+    "style": 'style="fill:none; display : none"',
+    "visibility": 'visibility="hidden"',
+    "visibility in style": 'style="visibility:hidden"',
+    "opacity": 'style="opacity:0"',
+}
+
+
+def svg(folder: Path, *shapes: str, around: str = "") -> Path:
+    path = folder / "d.svg"
+    body = "".join(shapes)
+    path.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="120mm" height="120mm"'
+        f' viewBox="0 0 120 120"><g {around}>{body}</g></svg>'
+    )
+    return path
+
+
+def outline(path: Path, element: str | None = None):
+    return read_drawing(path, DrawingReading()).outline(element)
+
+
+@pytest.mark.parametrize("element", ("plate", None))
+def test_a_hole_is_named_with_what_to_do(tmp_path, element):
+    path = svg(tmp_path, f'<path id="plate" d="{RING}"/>')
+    with pytest.raises(EitskinError, match="'plate' itself has 2 closed parts.*one rim.*split"):
+        outline(path, element)
+    two = svg(tmp_path, f'<path id="a" d="{SQUARE}"/><path id="b" d="M45 45H75V75H45Z"/>')
+    with pytest.raises(EitskinError, match="2 closed outlines; name one with element"):
+        outline(two)
+
+
+@pytest.mark.parametrize("how", HIDDEN.values(), ids=HIDDEN)
+def test_a_hidden_shape_is_no_rim(tmp_path, how):
+    shown = '<circle cx="60" cy="60" r="20"/>'
+    path = svg(tmp_path, f'<path d="{SQUARE}" {how}/>', shown)
+    assert np.ptp(outline(path).vertices_mm, axis=0).max() < 41
+    alone = svg(tmp_path, f'<path d="{SQUARE}" {how}/>')
+    with pytest.raises(EitskinError, match="nothing is drawn .* 1 hidden shapes or groups"):
+        outline(alone)
+    group = svg(tmp_path, f'<path d="{SQUARE}"/>', around=how)
+    with pytest.raises(EitskinError, match="nothing is drawn .* hidden"):
+        outline(group)
+
+
+def test_what_a_dxf_holds_besides_lines_is_named(tmp_path):
+    ezdxf = pytest.importorskip("ezdxf", reason="the extra drawing is not installed")
+    document = ezdxf.new(units=4)
+    hatch = document.modelspace().add_hatch()
+    hatch.paths.add_polyline_path([(0, 0), (100, 0), (100, 100)], is_closed=True)
+    document.paperspace().add_line((0, 0), (1, 1))
+    document.saveas(tmp_path / "h.dxf")
+    with pytest.raises(EitskinError, match=r"nothing is drawn .*1 HATCH.*1 LINE in paper space"):
+        read_drawing(tmp_path / "h.dxf", DrawingReading())
+
+
+def test_an_array_that_is_not_numbers_is_named(tmp_path):
+    from scipy import sparse
+    from scipy.io import savemat
+
+    cell = np.empty((1, 2), dtype=object)
+    cell[0, 0], cell[0, 1] = np.arange(3.0), np.arange(4.0)
+    savemat(tmp_path / "m.mat", {"vi": cell, "vh": {"meas": np.arange(3.0)}, "x": np.eye(2),
+                                 "s": sparse.csc_matrix(np.eye(3))})  # fmt: skip
+    np.savez(tmp_path / "p.npz", v=np.array([[1], [1, 2]], dtype=object), w=np.eye(2))
+    arrays = read_arrays(tmp_path / "m.mat")
+    assert np.array_equal(arrays["s"], np.eye(3))
+    for key, said in (("vi", "is a cell array; .*cell2mat"), ("vh", "is a struct; .*vh.meas"),
+                      ("vj", r"no array 'vj'.*not as numbers: vi \(a cell array\)")):  # fmt: skip
+        with pytest.raises(FrameError, match=said):
+            pick(arrays, key, "--voltage", "m.mat")
+    with pytest.raises(FrameError, match="is an array of pickled Python objects; .*np.savez"):
+        pick(read_arrays(tmp_path / "p.npz"), "v", "--voltage", "p.npz")
+
+
+def test_open_device_honours_the_speed():
+    def took(url: str) -> float:
+        with open_device(url) as device:
+            device.tare()
+            device.start_scene()
+            began = time.monotonic()
+            assert sum(1 for _ in device.stream(frames=6)) >= 6
+            return time.monotonic() - began
+
+    period_s = 1e-6 * 5 * open_period_us()
+    assert took("sim:two_touch?speed=0.5") >= 2 * period_s > period_s / 2
+
+
+def open_period_us() -> int:
+    with open_device("sim:two_touch") as device:
+        return device.board.frame_us
+
+
+def test_a_path_in_place_of_a_model():
+    for given in ("x.eitm", Path("x.eitm"), None):
+        with pytest.raises(UsageError, match=r"not a model; write .*eitskin\.load_model\(PATH\)"):
+            eitskin.Reconstructor(given)
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        ("reconstruct f.npz --iteration-limit 5", "did you mean '--iterations'"),
+        ("import f.csv -o x.npz --protokol adjacent", "did you mean '--protocol'"),
+        ("stream --device sim:two_touch --frame-count 3", "did you mean"),
+        ("view --devise sim:two_touch", "did you mean '--device'"),
+    ],
+)
+def test_the_nearest_option(typed, said, capsys):
+    assert main(shlex.split(typed)) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_no_found_touch_has_no_error_in_mm(tmp_path, capsys):
+    frames = session().as_frames()
+    quiet = np.repeat(frames.reference_v[None], frames.n_frames, axis=0)
+    from dataclasses import replace
+
+    save_frames(tmp_path / "q.npz", replace(frames, voltage_v=quiet))
+    assert main(["reconstruct", str(tmp_path / "q.npz")]) == 0
+    out = capsys.readouterr().out
+    assert "nan" not in out and "0 of" in out
+
+
+def test_printed_commands_have_their_paths_quoted(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my run").mkdir()
+    volts = session().as_frames()
+    table = -np.vstack([volts.reference_voltage_v, volts.voltage_v])
+    np.savetxt("my run/a b.csv", table, delimiter=",")
+    words = ["--protocol", "adjacent", "--electrodes", "16", "--reference-frames", "0"]
+    assert main(["doctor", "my run/a b.csv", *words]) == 11
+    line = capsys.readouterr().out.partition("all in one: ")[2].strip()
+    assert main(shlex.split(line)[1:]) == 0
+    capsys.readouterr()
+    assert main(["import", "my run/a b.csv", "-o", "my run/c d.npz", *words]) == 0
+    assert "eitskin doctor 'my run/c d.npz'" in capsys.readouterr().out
