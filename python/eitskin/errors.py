@@ -99,7 +99,8 @@ def missing_checkout(what: str, *folders: str) -> MissingExtraError:
     """Return the error for ``what``, which is in ``folders`` of a checkout and not in the wheel."""
     names = " ".join(f"./{folder}" for folder in folders)
     return MissingExtraError(
-        f"{what} comes with eitskin's sources alone: run there  pip install {names}"
+        f"{what} comes with a checkout of eitskin's sources, not with the wheel: in the checkout's"
+        f" folder run  pip install {names}"
     )
 
 

@@ -28,6 +28,7 @@ AS_IN = {
 }
 SCHEMES = ("auto", *AS_IN)
 MAX_BAUD = 20_000_000
+RATE_SLACK = 1.001  # frame periods are whole microseconds
 
 
 def open_device(
@@ -53,6 +54,11 @@ def open_device(
             emulator that it names.
     """
     device = Device(open_transport(url, model=model, image=image), room=room, reconnect=reconnect)
+    try:
+        _check_rate(device)
+    except UsageError:
+        device.close()
+        raise
     device.pacer = Pacer(split_timing(url)[1].speed or 0.0)
     if model is not None and device.board.has_model:
         from eitskin.model.eitm import decode_model
@@ -65,6 +71,21 @@ def open_device(
             device.close()
             raise
     return device
+
+
+def _check_rate(device: Device) -> None:
+    """Refuse a scene whose frames come faster than the board can scan them."""
+    scene = device.transport.capabilities.scene
+    frame_us = device.board.frame_us
+    if scene is None or scene.rate_hz is None or not frame_us:
+        return
+    most_hz = 1e6 / frame_us
+    if scene.rate_hz > most_hz * RATE_SLACK:
+        raise UsageError(
+            f"{device.transport.name}: rate_hz = {scene.rate_hz:g} in the scene, but a scan takes"
+            f" {frame_us / 1e3:g} ms: use at most {most_hz:.4g}, or make the frames without a"
+            " board:  eitskin scene run"
+        )
 
 
 def open_with_files(

@@ -94,7 +94,8 @@ class SimTransport(Transport):
     def __init__(self, name: str, board: SimBoard, *, loop: bool = False) -> None:
         self.url = self.name = f"sim:{name}"
         self.board, self._loop = board, loop
-        self._capabilities = Capabilities(own_clock=True, scene=SimulatedScene(name, loop=loop))
+        scene = SimulatedScene(name, loop=loop, rate_hz=board.frames.scene.rate_hz)
+        self._capabilities = Capabilities(own_clock=True, scene=scene)
 
     @property
     def capabilities(self) -> Capabilities:

@@ -17,12 +17,14 @@ class SimulatedScene:
             shows the frame that is nearest to the beginning of a scan, and the scene ends.
         loop: the scene begins again at its end.
         recorded: it was before the board whose recording this is.
+        rate_hz: the frames per second that the scene asks of the board; None: whatever it scans.
     """
 
     name: str
     held: bool = False
     loop: bool = False
     recorded: bool = False
+    rate_hz: float | None = None
 
 
 @dataclass(frozen=True)

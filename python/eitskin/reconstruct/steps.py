@@ -76,6 +76,16 @@ def is_stream(frames: Frames) -> bool:
     return times is not None and len(times) > 1 and bool(np.all(np.diff(times) > 0))
 
 
+IDS_OF_FRAMES = (
+    "the frames have no times, so ids number the touches of each frame alone; if the frames are a"
+    " stream, say --track, or import them with --time"
+)
+IDS_WITHOUT_ORDER = (
+    "the frames are not taken for a stream, so ids number the touches of each frame alone; if they"
+    " follow each other, say --track"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class ReconstructOutcome:
     """The outcome of a reconstruction.
@@ -126,12 +136,15 @@ def reconstruct_frames(
     check(how, output, picture, film)
     notes: list[str] = []
     frames, chosen = read(path, how.only)
+    undecided = how.track is None
     how = replace(how, track=how.tracked(frames))
     reconstructor, blob, name = choose_model(path, frames, how)
     know_converter(reconstructor, frames)
     point = apply_options(reconstructor, how, notes)
     reference = take_reference(path, reconstructor, frames, notes)
     results, refused = solve(reconstructor, blob, frames, chosen, how, progress)
+    if undecided and not how.track and sum(bool(one.touches) for one in results.values()) > 1:
+        notes.append(IDS_OF_FRAMES if frames.time_s is None else IDS_WITHOUT_ORDER)
     scores = score(reconstructor.model, frames, results, reconstructor.options.sign, point, notes)
     outcome = ReconstructOutcome(
         frames, reconstructor.model, name, how.engine, point, reference, results, refused, scores,

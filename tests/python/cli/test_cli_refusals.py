@@ -56,8 +56,8 @@ def test_every_command_has_help(command, capsys):
 def test_a_command_of_the_studies_says_where_they_are(command, refused, monkeypatch):
     monkeypatch.setattr("eitskin.cli.main.entry_points", lambda group: [])
     assert refused(EXTRA, f"{command} --help") == (
-        f"eitskin {command} comes with eitskin's sources alone: run there"
-        "  pip install ./firmware/emulator ./studies"
+        f"eitskin {command} comes with a checkout of eitskin's sources, not with the wheel: in the"
+        " checkout's folder run  pip install ./firmware/emulator ./studies"
     )
 
 

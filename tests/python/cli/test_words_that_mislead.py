@@ -2,6 +2,7 @@
 
 import shlex
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +46,7 @@ def outline(path: Path, element: str | None = None):
 @pytest.mark.parametrize("element", ("plate", None))
 def test_a_hole_is_named_with_what_to_do(tmp_path, element):
     path = svg(tmp_path, f'<path id="plate" d="{RING}"/>')
-    with pytest.raises(EitskinError, match="'plate' itself has 2 closed parts.*one rim.*split"):
+    with pytest.raises(EitskinError, match=r"'plate' itself has 2 closed parts.*one rim.*split"):
         outline(path, element)
     two = svg(tmp_path, f'<path id="a" d="{SQUARE}"/><path id="b" d="M45 45H75V75H45Z"/>')
     with pytest.raises(EitskinError, match="2 closed outlines; name one with element"):
@@ -58,10 +59,10 @@ def test_a_hidden_shape_is_no_rim(tmp_path, how):
     path = svg(tmp_path, f'<path d="{SQUARE}" {how}/>', shown)
     assert np.ptp(outline(path).vertices_mm, axis=0).max() < 41
     alone = svg(tmp_path, f'<path d="{SQUARE}" {how}/>')
-    with pytest.raises(EitskinError, match="nothing is drawn .* 1 hidden shapes or groups"):
+    with pytest.raises(EitskinError, match=r"nothing is drawn .* 1 hidden shapes or groups"):
         outline(alone)
     group = svg(tmp_path, f'<path d="{SQUARE}"/>', around=how)
-    with pytest.raises(EitskinError, match="nothing is drawn .* hidden"):
+    with pytest.raises(EitskinError, match=r"nothing is drawn .* hidden"):
         outline(group)
 
 
@@ -91,7 +92,7 @@ def test_an_array_that_is_not_numbers_is_named(tmp_path):
                       ("vj", r"no array 'vj'.*not as numbers: vi \(a cell array\)")):  # fmt: skip
         with pytest.raises(FrameError, match=said):
             pick(arrays, key, "--voltage", "m.mat")
-    with pytest.raises(FrameError, match="is an array of pickled Python objects; .*np.savez"):
+    with pytest.raises(FrameError, match=r"is an array of pickled Python objects; .*np.savez"):
         pick(read_arrays(tmp_path / "p.npz"), "v", "--voltage", "p.npz")
 
 
@@ -133,11 +134,38 @@ def test_the_nearest_option(typed, said, capsys):
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("rate_hz", "code"), [(5, 0), (48, 0), (60, 2)])
+def test_the_rate_of_a_scene_holds_or_is_refused(tmp_path, capsys, rate_hz, code):
+    scene = tmp_path / "s.toml"
+    scene.write_text(
+        f"[scene]\nframes = 4\nquiet_frames = 8\nelements = 1500\nrate_hz = {rate_hz}\n"
+    )
+    words = ["stream", "--device", f"sim:{scene}", "--frames", "3", "--json"]
+    assert main(words) == code
+    said = capsys.readouterr()
+    if code:
+        assert "a scan takes 20.8 ms: use at most 48.08" in said.err
+        return
+    with open_device(f"sim:{scene}") as device:
+        assert abs(device.board.frame_us - 1e6 / rate_hz) < 40
+
+
+def test_ids_without_times_are_explained(tmp_path, capsys):
+    frames = session().as_frames()
+    save_frames(tmp_path / "f.npz", replace(frames, time_s=None))
+    assert main(["reconstruct", str(tmp_path / "f.npz")]) == 0
+    assert (
+        "ids number the touches of each frame alone; if the frames are a stream, say --track"
+        in (capsys.readouterr().err)
+    )
+    assert main(["reconstruct", str(tmp_path / "f.npz"), "--no-track"]) == 0
+    assert main(["reconstruct", str(tmp_path / "f.npz"), "--track"]) == 0
+    assert "ids number" not in capsys.readouterr().err
+
+
 def test_no_found_touch_has_no_error_in_mm(tmp_path, capsys):
     frames = session().as_frames()
     quiet = np.repeat(frames.reference_v[None], frames.n_frames, axis=0)
-    from dataclasses import replace
-
     save_frames(tmp_path / "q.npz", replace(frames, voltage_v=quiet))
     assert main(["reconstruct", str(tmp_path / "q.npz")]) == 0
     out = capsys.readouterr().out

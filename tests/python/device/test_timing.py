@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from eitskin.device.pacing import Pacer, Slowness
 from eitskin.device.timing import Timing, split_timing
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import UsageError
 from eitskin.session.frame import Frame
-from eitskin.device.pacing import Pacer, Slowness
 from eitskin.session.session import Session
 from eitskin.session.settings import SessionSettings
 from eitskin.truth import observe_scene

@@ -41,7 +41,7 @@ def scene(tmp_path_factory) -> Path:
     path: Path = tmp_path_factory.mktemp("scene") / "two.toml"
     touches = "".join(f"[[touch]]\nx_mm = {x}\ny_mm = {y}\nradius_mm = 9.0\n" for x, y in PLACES)
     path.write_text(
-        "[scene]\nframes = 12\nquiet_frames = 16\nelements = 2500\nrate_hz = 50.0\n"
+        "[scene]\nframes = 12\nquiet_frames = 16\nelements = 2500\nrate_hz = 48.0\n"
         f"{touches}[effects.noise]\nsnr_db = 60.0\n"
     )
     return path

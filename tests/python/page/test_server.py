@@ -36,7 +36,7 @@ from line_of_a_board import Line
 def scene(tmp_path_factory) -> Path:
     path: Path = tmp_path_factory.mktemp("scene") / "one.toml"
     path.write_text(
-        "[scene]\nframes = 10\nquiet_frames = 16\nelements = 1500\nrate_hz = 50.0\n"
+        "[scene]\nframes = 10\nquiet_frames = 16\nelements = 1500\nrate_hz = 48.0\n"
         "[[touch]]\nx_mm = 20.0\ny_mm = 0.0\nradius_mm = 9.0\n"
     )
     return path
