@@ -48,7 +48,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(
         build,
         "--rank",
-        "rows of the reduced Jacobian (default: 64, or all independent rows if fewer)",
+        "rows of the reduced Jacobian (default: 4 per electrode and at least 64, or all independent"
+        " rows if fewer)",
         int,
     )
     option(build, "--pixels", "number of pixels along the longer side", default=32)

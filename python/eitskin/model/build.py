@@ -44,11 +44,16 @@ LOG_RADIUS_WEIGHT = 1.0
 ERROR_ELEMENTS = 6000
 
 
+# 32 electrodes report model mismatch on perfect frames at rank 64 and none from 96 on.
+RANK_PER_ELECTRODE, MIN_RANK = 4, 64
+
+
 @dataclass(frozen=True)
 class BuildSettings:
-    """The settings for building a model. ``rank`` 0 takes the number of independent rows, at most
-    64. ``samples`` is the number of random skins that are drawn for the model errors: 0 draws none,
-    and None takes the number from the skin's uncertainty."""
+    """The settings for building a model. ``rank`` 0 takes RANK_PER_ELECTRODE per electrode and at
+    least MIN_RANK, or the number of independent rows if that is smaller. ``samples`` is the number
+    of random skins that are drawn for the model errors: 0 draws none, and None takes the number
+    from the skin's uncertainty."""
 
     rank: int = 0
     pixels_across: int = 32
@@ -99,6 +104,13 @@ def linearise(
     return Linearisation(grid, jacobian, v0, mesh.n_elements, fields)
 
 
+def default_rank(n_electrodes: int, limits: tuple[int, ...]) -> int:
+    """Return the rank of a reduced Jacobian, at most the least of ``limits`` (independent rows,
+    rows, pixels). More electrodes see finer changes; those beyond the rank would count as model
+    mismatch."""
+    return min(max(MIN_RANK, RANK_PER_ELECTRODE * n_electrodes), MAX_RANK, *limits)
+
+
 def make_model(
     skin: Skin, protocol: Protocol, linear: Linearisation, settings: BuildSettings
 ) -> Model:
@@ -113,7 +125,7 @@ def make_model(
         silent = np.abs(v_ref) < MIN_RATIO_REFERENCE * np.sqrt(np.mean(v_ref**2))
         jacobian = np.where(silent[:, None], 0.0, jacobian / np.where(silent, 1.0, v_ref)[:, None])
     independent = require_independent(protocol, min(settings.rank, len(fold.first)))
-    rank = settings.rank or min(64, independent, *jacobian.shape)
+    rank = settings.rank or default_rank(protocol.n_electrodes, (independent, *jacobian.shape))
     reduction = reduce_jacobian(
         jacobian, rank, regularisation=settings.regularisation, column_power=settings.column_power
     )

@@ -143,9 +143,10 @@ def reconstruct_frames(
     point = apply_options(reconstructor, how, notes)
     reference = take_reference(path, reconstructor, frames, notes)
     results, refused = solve(reconstructor, blob, frames, chosen, how, progress)
-    if undecided and not how.track and sum(bool(one.touches) for one in results.values()) > 1:
-        notes.append(IDS_OF_FRAMES if frames.time_s is None else IDS_WITHOUT_ORDER)
     scores = score(reconstructor.model, frames, results, reconstructor.options.sign, point, notes)
+    several = sum(bool(one.touches) for one in results.values()) > 1
+    if undecided and not how.track and several and not scores:
+        notes.append(IDS_OF_FRAMES if frames.time_s is None else IDS_WITHOUT_ORDER)
     outcome = ReconstructOutcome(
         frames, reconstructor.model, name, how.engine, point, reference, results, refused, scores,
         tuple(notes),

@@ -13,7 +13,7 @@ from eitskin.cli.main import main
 from eitskin.device.open import open_device
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.frames.arrays import pick, read_arrays
-from eitskin.frames.frames import save_frames
+from eitskin.frames.frames import Frames, save_frames
 from eitskin.skin.drawing import read_drawing
 from eitskin.skin.drawing_shapes import DrawingReading
 from small_models import session
@@ -151,8 +151,9 @@ def test_the_rate_of_a_scene_holds_or_is_refused(tmp_path, capsys, rate_hz, code
 
 
 def test_ids_without_times_are_explained(tmp_path, capsys):
-    frames = session().as_frames()
-    save_frames(tmp_path / "f.npz", replace(frames, time_s=None))
+    scene = session().as_frames()
+    frames = Frames(scene.protocol, scene.voltage_v, scene.reference_voltage_v)
+    save_frames(tmp_path / "f.npz", frames)
     assert main(["reconstruct", str(tmp_path / "f.npz")]) == 0
     assert (
         "ids number the touches of each frame alone; if the frames are a stream, say --track"
