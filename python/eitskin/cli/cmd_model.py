@@ -13,7 +13,7 @@ from tqdm import tqdm
 from eitskin.cli.arguments import RING_OHM, Output, option
 from eitskin.cli.device_options import DEVICE_HELP
 from eitskin.cli.pattern_options import add_pattern, skin_and_protocol, with_pattern
-from eitskin.cli.printing import answer, print_json
+from eitskin.cli.printing import answer, print_json, say
 from eitskin.cli.progress import bar
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import force_text
@@ -34,6 +34,8 @@ from eitskin.skin.skin import Skin, skin_of_eidors
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 
 NUMPY_BOUND = 1e-4
+
+MIN_PIXELS_ACROSS = 4  # of a skin's width, below which model build warns
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -158,6 +160,13 @@ def run_build(options: argparse.Namespace) -> int:
     model = build_model(skin, protocol, settings, progress=bar("random skins"), jacobian=jacobian)
     size = save_model(options.output, model)
     _print_info(model, size, str(options.output), options.json)
+    width_mm = 2 * skin.outline.area_mm2 / skin.outline.perimeter_mm
+    if width_mm < MIN_PIXELS_ACROSS * model.grid.pixel_mm:
+        say(
+            f"{options.output}: a pixel of {model.grid.pixel_mm:.3g} mm is too coarse for a skin"
+            f" about {width_mm:.3g} mm wide, so touches cannot be resolved across it; build it with"
+            "  --pixels N , or divide the skin"
+        )
     if not options.json:
         print("\n".join(advice(demand_of(transfer_by_elements(skin), protocol))))
     return 0

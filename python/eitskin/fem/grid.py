@@ -4,7 +4,7 @@ inside the outline are kept."""
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil
+from math import ceil, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,8 @@ from eitskin.errors import UsageError
 from eitskin.skin.outline import Outline
 
 MAX_PIXELS_ACROSS = 512
+WIDTHS_ACROSS = 4.5
+FULL = 1.5  # pixels of a narrow skin, per square of pixels_across; a disk has 0.79
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +92,9 @@ def grid_for(outline: Outline, pixels_across: int = 32) -> Grid:
     """Return the grid with ``pixels_across`` pixels along the longer side of the bounding box,
     centred on the shorter side.
 
+    A skin whose width, 2 area / perimeter, is small beside that side gets pixels as if
+    the side were WIDTHS_ACROSS widths, but at most FULL pixels per square of ``pixels_across``.
+
     Raises:
         UsageError: ``pixels_across`` is out of range.
     """
@@ -98,7 +103,9 @@ def grid_for(outline: Outline, pixels_across: int = 32) -> Grid:
             f"grid: {pixels_across} pixels across is out of range; use 4 to {MAX_PIXELS_ACROSS}"
         )
     x0, y0, x1, y1 = outline.bounding_box_mm
-    pixel_mm = max(x1 - x0, y1 - y0) / pixels_across
+    width_mm = 2 * outline.area_mm2 / outline.perimeter_mm
+    narrow_mm = max(WIDTHS_ACROSS * width_mm, sqrt(outline.area_mm2 / FULL))
+    pixel_mm = min(max(x1 - x0, y1 - y0), narrow_mm) / pixels_across
     nx, ny = (max(1, ceil(side / pixel_mm - 1e-9)) for side in (x1 - x0, y1 - y0))
     origin_mm = ((x0 + x1 - nx * pixel_mm) / 2, (y0 + y1 - ny * pixel_mm) / 2)
     iy, ix = np.divmod(np.arange(nx * ny), nx)

@@ -30,6 +30,27 @@ FILES = {
     "cm.csv": "x_cm,y_cm\n1,2\n",
     "far.csv": "x_mm,y_mm\n1,2\n2e5,0\n",
     "deep.csv": "x_mm,y_mm,depth_mm\n1,2,-4\n",
+    "counted.csv": "0,1,2,3,4\n0.1,0.2,0.3,0.4,0.5\n0.1,0.2,0.3,0.4,0.5\n",
+    "labelled.txt": "k\n1 2 3\n4 5 6\nk\n1 2 3\n4 5 6\n",
+    "two.txt": "mags: 1,2\nphases: 3,4\nmags: 5,6\nphases: 7,8\n",
+    "german.csv": "a;b\n0,1;0,2\n0,3;x\n",
+    "sheet.xlsx": "PK",
+    "cut.get": "1234",
+    "cut.eit": "18\n2\nname\n",
+    "notes.eit": "hello\n",
+    "full.csv": "\n".join([",".join(["0.5"] * 208)] * 4),
+    "empty.csv": "",
+    "layout.toml": "[lines]\nofset = 3\n",
+    "ofs.toml": '[lines]\noffset = "mid"\n',
+    "ring.svg": '<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm"'
+    ' viewBox="0 0 9 9"><path id="plate" d="M1 1H8V8H1Z M4 4H5V5H4Z"/></svg>',
+    "hidden.svg": '<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm"'
+    ' viewBox="0 0 9 9"><path d="M1 1H8V8H1Z" display="none"/></svg>',
+    "ring.toml": '[skin]\noutline = "ring.svg"\nelement = "plate"\nthickness_mm = 5.0\n'
+    "[electrodes]\ncount = 16\nwidth_mm = 0.3\n",
+    "hidden.toml": '[skin]\noutline = "hidden.svg"\nthickness_mm = 5.0\n'
+    "[electrodes]\ncount = 16\nwidth_mm = 0.3\n",
+    "fast.toml": "[scene]\nframes = 4\nquiet_frames = 8\nelements = 1500\nrate_hz = 60\n",
 }
 
 

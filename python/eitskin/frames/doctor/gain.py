@@ -123,10 +123,11 @@ def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
         return CheckOutcome(
             inconclusive=("the unit: it needs a skin with its conductivity (--skin)",)
         )
-    if not case.trusted.any():
+    strong = case.trusted & (np.abs(case.predicted) > WEAK_PER_RMS * rms(case.predicted))
+    if not strong.any():
         return CheckOutcome()
     measured_v, per_a = (
-        float(np.median(np.abs(frame[case.trusted]))) for frame in (case.reference, case.predicted)
+        float(np.median(np.abs(frame[strong]))) for frame in (case.reference, case.predicted)
     )
     if measured_v == 0:
         return CheckOutcome()
