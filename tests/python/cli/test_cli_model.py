@@ -58,7 +58,7 @@ def write_skin(
         ("disk", 16, "adjacent", "",
          {"protocol_rows": 208, "folded_rows": 104, "rank": 64, "storage": "f32"}),
         ("disk", 32, "adjacent", "--storage i8",
-         {"protocol_rows": 928, "folded_rows": 464, "rank": 64, "storage": "i8"}),
+         {"protocol_rows": 928, "folded_rows": 464, "rank": 128, "storage": "i8"}),
         ("L", 16, "opposite", "--rank 20 --storage f16",
          {"protocol_rows": 192, "rank": 20, "storage": "f16"}),
         ("clockwise L", 8, "adjacent", "--data log-ratio --samples 3",
