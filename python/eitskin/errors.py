@@ -8,6 +8,14 @@ docs/reference/error-codes.md lists the codes.
 LONGEST, ENDING = 3000, 1000  # characters of a line, and of the end that is kept of longer ones
 
 
+def printable(text: str) -> str:
+    """``text`` in one line, with escapes in place of what a terminal would obey: names come from
+    boards and files."""
+    if text.isprintable():
+        return text
+    return "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)
+
+
 class EitskinError(Exception):
     """Base of all errors that a user can cause or repair.
 
@@ -22,9 +30,7 @@ class EitskinError(Exception):
         if len(text) > LONGEST:
             # A very long word of the user is in the middle; the remedy is at the end.
             text = f"{text[: LONGEST - ENDING - 5]} ... {text[-ENDING:]}"
-        if text.isprintable():
-            return text
-        return "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)
+        return printable(text)
 
 
 class UsageError(EitskinError):

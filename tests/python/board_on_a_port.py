@@ -38,7 +38,8 @@ class Wire:
                 pass
             except OSError:
                 return
-            data = transport.read(0.0)
+            # an answer, and a frame: a simulated board that answers does not scan meanwhile
+            data = transport.read(0.0) + transport.read(0.0)
             while data and not self._stop.is_set():
                 try:
                     data = data[os.write(self.master, data) :]

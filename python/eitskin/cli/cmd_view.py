@@ -7,6 +7,7 @@ import webbrowser
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from urllib.parse import quote
 
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import (
@@ -106,7 +107,7 @@ def run(options: argparse.Namespace) -> int:
         outputs=partial(named_outputs, options) if options.to else None,
         teacher=_teacher(options),
     )
-    address = f"{server.address}#token={token}"
+    address = f"{server.address}#token={quote(token, safe='')}"
     print(f"open {address}", flush=True)
     if options.open:
         webbrowser.open(address)

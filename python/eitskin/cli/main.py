@@ -16,6 +16,7 @@ from eitskin import __version__
 from eitskin.cli.arguments import option, refuse_named_twice
 from eitskin.config import nearest
 from eitskin.errors import EitskinError, FileError, UsageError, missing_checkout
+from eitskin.process import take_over
 
 COMMANDS = {  # the description of each command
     "demo": "reconstruct three simulated touches in C, and compare them with the truth",
@@ -111,6 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code (docs/reference/error-codes.md). Errors are printed
     as one line on stderr."""
     traceback = False
+    if arguments is None:
+        take_over()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")  # names that the terminal cannot show

@@ -5,10 +5,12 @@ import json
 import sys
 from typing import Any
 
+from eitskin.errors import printable
+
 
 def say(text: str) -> None:
     """Print a line for people on stderr."""
-    print(f"eitskin: {text}", file=sys.stderr, flush=True)
+    print(f"eitskin: {printable(text)}", file=sys.stderr, flush=True)
 
 
 def say_progress(text: str) -> None:
@@ -20,7 +22,9 @@ def say_progress(text: str) -> None:
 def table(facts: dict[str, Any]) -> str:
     """Return names and values in two columns."""
     width = max(len(name) for name in facts) + 2
-    return "\n".join(f"{name.replace('_', ' '):{width}}{value}" for name, value in facts.items())
+    return "\n".join(
+        f"{name.replace('_', ' '):{width}}{printable(str(value))}" for name, value in facts.items()
+    )
 
 
 def print_json(facts: Any) -> None:
@@ -33,5 +37,5 @@ def answer(options: argparse.Namespace, facts: Any, *lines: str) -> int:
     if options.json:
         print_json(facts)
     else:
-        print("\n".join(lines))
+        print("\n".join(printable(one) for line in lines for one in line.split("\n")))
     return 0

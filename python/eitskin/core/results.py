@@ -65,6 +65,18 @@ def check_shape(frames: AnyArray, n_rows: int, what: str, least: int = 0) -> Non
         )
 
 
+def frame_numbers(values: npt.ArrayLike, what: str) -> FloatArray:
+    """``values`` as an array; what a numpy mask hides is NaN, which no row can use."""
+    try:
+        if isinstance(values, np.ma.MaskedArray):
+            return np.where(np.ma.getmaskarray(values), np.nan, np.asarray(values, np.float64))
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise FrameError(
+            f"{what}: is not an array of voltages; give numbers in V, rows of one length"
+        ) from None
+
+
 def check_reference_frames(frames: FloatArray, masked: BoolArray, saturation_v: float) -> None:
     """Raise a FrameError if untouched ``frames`` (k, m) have an unusable voltage in a row that is
     not ``masked`` (m,). With ``saturation_v`` 0 no voltage counts as saturated."""

@@ -1,7 +1,8 @@
 """``text:PORT?layout=FILE``: an instrument that sends its frames as lines of text."""
 
 import time
-from collections import deque
+from collections import Counter, deque
+from contextlib import suppress
 from urllib.parse import unquote
 
 from eitskin.config import plain_number
@@ -9,7 +10,7 @@ from eitskin.device.source import MAX_GAP_S, GivenFrame, Source, SourceTransport
 from eitskin.device.text_port import LinePort, open_port
 from eitskin.device.transport import LinkEvent
 from eitskin.errors import DeviceError, FrameError, UsageError
-from eitskin.frames.layout import BadLine, Layout, LineFrame, LineParser, load_layout
+from eitskin.frames.layout import BadLine, Layout, LineFrame, LineParser, has_number, load_layout
 from eitskin.frames.lines import LineReader, Row
 from eitskin.frames.placement import RowPlacement, place
 from eitskin.model.model import Model
@@ -18,6 +19,7 @@ BAUD = 115_200
 MAX_BAUD = 20_000_000
 WAIT_S, MAX_WAIT_S = 10.0, 600.0  # for the first two frames
 MAX_LINE = 1 << 20
+MAX_UNDECIDED = 16  # lines until one length is taken, although no two are as long
 MAX_REPORTED = 8  # kinds of bad lines
 HELP = "text:PORT?layout=FILE&baud=115200"
 
@@ -41,6 +43,7 @@ class TextSource(Source):
         self._rest, self._lines = b"", 0
         self._cut = port.cut
         self._parsed: deque[tuple[LineFrame, float]] = deque()  # and when it came
+        self._undecided: list[Row] = []
         self._events: list[LinkEvent] = []
         self._reported: set[str] = set()
         self._first_bad = ""
@@ -169,6 +172,8 @@ class TextSource(Source):
             self._skip("", "")
 
     def _rows(self, rows: list[Row]) -> None:
+        if self._parser.cells is None:
+            rows = self._decided(rows)
         for row in rows:
             if self._header:
                 self._header -= 1
@@ -179,6 +184,22 @@ class TextSource(Source):
                 self._skip(str(len(row.cells)), str(error))
             except UsageError as error:
                 raise UsageError(f"{self._where}: {error}") from None
+
+    def _decided(self, rows: list[Row]) -> list[Row]:
+        """How long a line is where the layout does not say: as long as two that came, so that a
+        first one that was cut is skipped. Returns the rows up to then, once that is known."""
+        self._undecided += rows
+        lengths = Counter(
+            len(row.cells) for row in self._undecided[self._header :] if has_number(row)
+        )
+        common, times = next(iter(lengths.most_common(1)), (0, 0))
+        if times < 2 and not self._port.ended and len(self._undecided) < MAX_UNDECIDED:
+            return []
+        found, self._undecided = self._undecided, []
+        with suppress(BadLine):  # each line says so
+            if common:
+                self._parser.choose(common)
+        return found
 
     def _skip(self, kind: str, text: str) -> None:
         """Count a line; the first of a ``kind`` is reported."""

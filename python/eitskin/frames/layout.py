@@ -204,12 +204,9 @@ class LineParser:
         """
         cells = row.cells
         if self.cells is None:
-            if not any(parse_cell(cell) is not None for cell in cells):
+            if not has_number(row):
                 raise BadLine(f"line {row.line} holds no number")
-            try:
-                self._choose(len(cells))
-            except UsageError as error:  # perhaps the end of a line that was cut
-                raise BadLine(f"line {row.line}: {error}") from None
+            self.choose(len(cells))
         if len(cells) != self.cells:
             raise BadLine(f"line {row.line} has {len(cells)} numbers where {self.cells} should be")
         values = _parsed([cells[k] for k in self._columns])
@@ -218,6 +215,17 @@ class LineParser:
         time = None if self._time is None else parse_cell(cells[self._time])
         scale = self.layout.options.source.time_scale
         return LineFrame(self._complex(values), None if time is None else time.real * scale)
+
+    def choose(self, cells: int) -> None:
+        """Lines of ``cells`` cells are frames from now on.
+
+        Raises:
+            BadLine: they lack columns that the layout names.
+        """
+        try:
+            self._choose(cells)
+        except UsageError as error:
+            raise BadLine(f"lines of {cells} numbers: {error}") from None
 
     @property
     def channels(self) -> int | None:
@@ -257,6 +265,11 @@ class LineParser:
         elif source.complex_part in ("real", "imag"):
             values = np.asarray(getattr(values, source.complex_part))
         return np.asarray(values * (1.0 if source.scale is None else source.scale))
+
+
+def has_number(row: Row) -> bool:
+    """Whether a cell of ``row`` is a number."""
+    return any(parse_cell(cell) is not None for cell in row.cells)
 
 
 def _parsed(cells: Sequence[str]) -> AnyArray:

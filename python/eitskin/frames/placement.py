@@ -132,10 +132,7 @@ def place(
             f"{where}: equalise needs a whole file; take it out, or calibrate:  eitskin calibrate"
         )
     n, wanted = model.protocol.n_electrodes, model.protocol
-    try:
-        skin: Skin | None = model.skin
-    except Exception:  # without a description, the skin counts as numbered counterclockwise
-        skin = None
+    skin = model.known_skin  # without it, the skin counts as numbered counterclockwise
     rows = source_rows(options, None, protocol or wanted, skin, n, where)
     rows = relabel(rows, swap_map(n, options.swaps))
     measured = np.asarray(wanted.drive_measure, dtype=np.int64)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.arrays import FloatArray
+from eitskin.errors import EitskinError
 from eitskin.fem.grid import Grid
 from eitskin.model.force_law import ForceLaw
 from eitskin.model.model_errors import ModelErrors
@@ -130,3 +131,12 @@ class Model:
         ConfigError: the model has no description of its skin.
         """
         return skin_from_table(self.meta.get("skin", {}), "the model's own description")
+
+    @cached_property
+    def known_skin(self) -> Skin | None:
+        """``skin``; None if the model has no description of it that can be read, such as one by a
+        newer eitskin."""
+        try:
+            return self.skin
+        except EitskinError:
+            return None

@@ -82,11 +82,14 @@ def setup_text(session: Session, may_command: bool) -> str:
 
 
 def _skin(session: Session) -> dict[str, Any] | None:
-    """Outline, electrodes and pixels; None where the board's model is not known here."""
+    """Outline, electrodes and pixels; None where the board's model is not known here, or does not
+    describe its skin in a way that can be read."""
     if session.known is None:
         return None
     model = session.known.model
-    skin, grid = model.skin, model.grid
+    skin, grid = model.known_skin, model.grid
+    if skin is None:
+        return None
     spans = [
         skin.outline.points_at(np.linspace(start, end, 5))
         for start, end in skin.electrode_spans_mm()

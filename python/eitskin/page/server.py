@@ -120,11 +120,13 @@ class PageServer:
 
     def serve(self) -> None:
         """Until Ctrl-C or ``stop``."""
+        from eitskin.page.connections import connection_classes
+
         config = self._uvicorn.Config(
             self._app(),
             log_level="warning",
             lifespan="off",
-            ws="websockets-sansio",
+            **connection_classes(),
             ws_per_message_deflate=False,
             ws_max_size=1 << 16,
             server_header=False,
@@ -210,7 +212,10 @@ class PageServer:
         address; any other name may be a trick of another site (DNS rebinding)."""
         if not re.fullmatch(r"[A-Za-z0-9.\-]+(:\d{1,5})?|\[[0-9A-Fa-f:.]+\](:\d{1,5})?", host):
             return False
-        name = (urlsplit(f"//{host}").hostname or "").lower()
+        try:
+            name = (urlsplit(f"//{host}").hostname or "").lower()
+        except ValueError:  # such as [:::::]
+            return False
         if name in ("localhost", self.host.lower(), socket.gethostname().lower()):
             return True
         try:
@@ -224,7 +229,10 @@ class PageServer:
         host, origin = headers.get("host", ""), headers.get("origin")
         if not self._host_is_ours(host):
             return False
-        return origin is None or urlsplit(origin).netloc == host
+        try:
+            return origin is None or urlsplit(origin).netloc == host
+        except ValueError:  # such as http://[
+            return False
 
     def _knows(self, token: object) -> bool:
         return isinstance(token, str) and hmac.compare_digest(token.encode(), self._token.encode())
@@ -250,6 +258,7 @@ class PageServer:
         return Response(content, media_type=kind, headers=headers)
 
     async def _model(self, request: Request) -> Response:
+        from starlette.requests import ClientDisconnect
         from starlette.responses import JSONResponse
 
         if not self._from_here(request.headers):
@@ -257,10 +266,13 @@ class PageServer:
         if not self._knows(request.headers.get("x-eitskin-token")):
             return JSONResponse({"error": "this needs the token"}, 401)
         body = bytearray()
-        async for piece in request.stream():
-            body += piece
-            if len(body) > MAX_MODEL_BYTES:
-                return JSONResponse({"error": "this is too long for a model"}, 413)
+        try:
+            async for piece in request.stream():
+                body += piece
+                if len(body) > MAX_MODEL_BYTES:
+                    return JSONResponse({"error": "this is too long for a model"}, 413)
+        except ClientDisconnect:  # nobody reads the answer
+            return JSONResponse({"error": "the upload was cut off"}, 400)
         try:
             text = await asyncio.wrap_future(self.commands.upload(bytes(body)))
         except EitskinError as error:
@@ -332,7 +344,7 @@ class PageServer:
                     if message.get("type") == "drawn":
                         page.drawn(int(message["number"]))
                         continue
-                except (ValueError, KeyError, TypeError):
+                except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
                     await socket.close(1003)
                     return
                 if len(answers) >= MAX_WAITING:

@@ -45,7 +45,7 @@ class Teacher:
             self._file = PressFile(self.path, self.plan, protocol, self._text)
             self._guide = PressGuide(self.plan, start=self._file.following)
             if self._skin is None and session.known is not None:
-                self._skin = session.known.model.skin
+                self._skin = session.known.model.known_skin
         self.on_event(self.facts())
 
     def take(self, message: Message) -> None:

@@ -43,6 +43,7 @@ class CsvSink:
         lines = [shared | touch for touch in message["touches"] or [{}]]
         self._file.write(_text([[line.get(name) for name in COLUMNS] for line in lines]))
         self._file.sync_now_and_then()
+        self._file.check()
 
     def close(self) -> None:
         self._file.close()

@@ -52,6 +52,7 @@ class McapSink:
             self._put("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", table, now)
             self._status = table["status"]
         self._stream.sync_now_and_then()
+        self._stream.check()
 
     def close(self) -> None:
         if self._writer is None:

@@ -214,14 +214,14 @@ class Queue:
                 self._sent += 1
             except Dropped:
                 self._dropped += 1
-            except Exception as error:
+            except BaseException as error:  # a sink that raises SystemExit is no reason to end
                 self._fail(error)
         try:
             self._sink.close()
-        except Exception as error:
+        except BaseException as error:
             self._fail(error)
 
-    def _fail(self, error: Exception) -> None:
+    def _fail(self, error: BaseException) -> None:
         """Count an error, and report it unless it is the same as the last one."""
         self._failed += 1
         text = " ".join(str(error).split()) or type(error).__name__

@@ -34,8 +34,10 @@ class TouchSource:
 
     @property
     def box_mm(self) -> Box | None:
-        """The skin's bounding box (x0, y0, x1, y1), or None if the model is not known."""
-        return None if self.model is None else self.model.skin.outline.bounding_box_mm
+        """The skin's bounding box (x0, y0, x1, y1), or None if the model is not known or does not
+        describe its skin."""
+        skin = None if self.model is None else self.model.known_skin
+        return None if skin is None else skin.outline.bounding_box_mm
 
 
 class OutgoingMessage:

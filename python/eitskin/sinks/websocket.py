@@ -74,12 +74,22 @@ class WebSocketSink:
 
     async def _serve(self, host: str, port: int) -> Any:
         try:
-            from websockets.asyncio.server import serve
+            from websockets.asyncio.server import ServerConnection, serve
         except ImportError:
             raise missing_extra("ws", "websockets") from None
+
+        class Client(ServerConnection):
+            def data_received(self, data: bytes) -> None:
+                """Pings are answered at once, so one that only pings and never reads is cut."""
+                if self.transport.get_write_buffer_size() > 2 * FULL_BYTES:
+                    self.transport.abort()
+                else:
+                    super().data_received(data)
+
         return await serve(
-            self._client, host, port, origins=[None, LOCAL], max_size=1 << 16, close_timeout=1
-        )
+            self._client, host, port, origins=[None, LOCAL], max_size=1 << 16, close_timeout=1,
+            create_connection=Client,
+        )  # fmt: skip
 
     async def _client(self, client: Any) -> None:
         self._clients.add(client)

@@ -143,6 +143,8 @@ def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = 
     name = sheet.get("name", "skin")
     if not isinstance(name, str) or not name:
         raise ConfigError(f"{place}: name must be a word in quotes, not {name!r}")
+    if not name.isprintable():
+        raise ConfigError(f"{place}: name {name!r} has characters that cannot be printed")
     contacts = _subtable(table, "electrodes", where)
     try:
         drawing = _drawing_of(sheet, place, folder)

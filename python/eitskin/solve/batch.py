@@ -19,6 +19,7 @@ from eitskin.core.results import (
     Reconstruction,
     check_options,
     check_shape,
+    frame_numbers,
 )
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.eitm import encode_model
@@ -103,7 +104,7 @@ class Batch:
             UsageError: another thread goes through ``each``.
         """
         self._turn.check()
-        frames = np.atleast_2d(np.asarray(untouched_v, dtype=np.float64))
+        frames = np.atleast_2d(frame_numbers(untouched_v, "reference"))
         check_shape(frames, self._engines[0].n_rows, "reference", least=1)
         self._last = self._last[:0]
         learned = self._on_each(lambda one: one.set_reference(frames))
@@ -142,7 +143,7 @@ class Batch:
     def _numbered(
         self, mine: object, frames_v: npt.ArrayLike, touches: bool
     ) -> Iterator[Reconstruction | FrameError]:
-        frames = np.asarray(frames_v, dtype=np.float64)
+        frames = frame_numbers(frames_v, "frames")
         check_shape(frames, self._engines[0].n_rows, "frames")
         size = max(1, min(MAX_IN_BLOCK, len(frames) // (4 * self.threads)))
         free: SimpleQueue[CoreEngine] = SimpleQueue()

@@ -19,8 +19,9 @@ from eitskin.core.results import (
     Reconstruction,
     check_options,
     check_shape,
+    frame_numbers,
 )
-from eitskin.errors import FrameError, ProtocolError, UsageError
+from eitskin.errors import ProtocolError, UsageError
 from eitskin.model.eitm import decode_model, encode_model, load_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
@@ -145,7 +146,7 @@ class Reconstructor:
         Raises:
             FrameError: a frame has the wrong length or cannot be used.
         """
-        frames = np.atleast_2d(_numbers(untouched_v, "reference"))
+        frames = np.atleast_2d(frame_numbers(untouched_v, "reference"))
         check_shape(frames, self.model.protocol.n_rows, "reference", least=1)
         with self.lock:
             learned = self._engine.set_reference(frames)
@@ -175,7 +176,7 @@ class Reconstructor:
         Raises:
             FrameError: the frame cannot be used, or no reference has been taken.
         """
-        result = self._engine.reconstruct(_numbers(frame_v, "frame"), touches=touches)
+        result = self._engine.reconstruct(frame_numbers(frame_v, "frame"), touches=touches)
         return replace(result, model=self.model)
 
     def stream(self, frames_v: Iterable[npt.ArrayLike]) -> Iterator[Reconstruction]:
@@ -214,15 +215,3 @@ def _again(
     if untouched is not None:
         made.tare(untouched)
     return made
-
-
-def _numbers(values: npt.ArrayLike, what: str) -> FloatArray:
-    """``values`` as an array; what a numpy mask hides is NaN, which no row can use."""
-    try:
-        if isinstance(values, np.ma.MaskedArray):
-            return np.where(np.ma.getmaskarray(values), np.nan, np.asarray(values, np.float64))
-        return np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise FrameError(
-            f"{what}: is not an array of voltages; give numbers in V, rows of one length"
-        ) from None

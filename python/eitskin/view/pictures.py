@@ -9,6 +9,9 @@ no display.
 from __future__ import annotations
 
 import math
+import os
+import sys
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +22,7 @@ from eitskin.arrays import AnyArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import missing_extra
 from eitskin.fem.grid import Grid
+from eitskin.process import is_own
 from eitskin.skin.skin import Skin
 
 if TYPE_CHECKING:
@@ -95,11 +99,15 @@ class Panel:
 
 
 def load_matplotlib() -> Any:
-    """Return matplotlib, set up to draw without a display.
+    """Return matplotlib, set up to draw without a display. A backend that the user's environment
+    names is left to the user's own figures, and need not exist here; on the command line no setting
+    of theirs counts.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
     """
+    first = "matplotlib" not in sys.modules
+    backend = os.environ.pop("MPLBACKEND", None) if first else None
     try:
         import matplotlib
         import matplotlib.backends.backend_agg
@@ -107,6 +115,14 @@ def load_matplotlib() -> Any:
         import matplotlib.ticker
     except ImportError:
         raise missing_extra("plot", "matplotlib") from None
+    finally:
+        if backend is not None:
+            os.environ["MPLBACKEND"] = backend
+    if is_own() and first:
+        matplotlib.rcdefaults()
+    elif backend is not None:
+        with suppress(ValueError):  # one that is not installed here
+            matplotlib.rcParams["backend"] = backend
     return matplotlib
 
 

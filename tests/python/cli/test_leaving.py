@@ -143,7 +143,12 @@ def test_ctrl_c_ends_it(port, program, state, tmp_path):
     began = time.monotonic()
     command = [sys.executable, *(one.replace("{url}", port.url) for one in PROGRAMS[program])]
     child = subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=(tmp_path / "said").open("w")
+        command,
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=(tmp_path / "said").open("w"),
+        # a shell's background job has Ctrl-C off, and what it starts too
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     end = threading.Event()
     try:

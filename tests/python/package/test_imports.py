@@ -17,7 +17,7 @@ CHECKOUT = ("eitskin_emulator", "eitskin_studies")  # not in the wheel
 
 # Each imports from its own line and those above it alone.
 ORDER = (
-    {"errors", "arrays", "progress"},
+    {"errors", "arrays", "process", "progress"},
     {"fileio", "threads"},
     {"config"},
     {"core", "skin", "firmware"},

@@ -111,40 +111,46 @@ class RecordingFile:
 
 class WaitingFile:
     """Writes into ``file``; what finds no room waits in memory, ``MAX_WAITING`` bytes at most, and
-    is written in its order as soon as there is room. Each ``write`` is there whole or not at all.
-
-    A ``write`` raises the FileError of a full disk once per time that it is full. When too much
-    waits, the file ends there: every later call raises.
+    is written in its order as soon as there is room. Each ``write`` is there whole or not at all,
+    and raises nothing, so that no writer of records is cut in the middle of one. When too much
+    waits, the file ends there.
     """
 
     def __init__(self, file: RecordingFile) -> None:
         self._file, self._waiting = file, deque[bytes]()
+        self._error: FileError | None = None
         self._told = self._over = False
         self._size = file.tell_or_zero()
 
     def write(self, data: bytes) -> int:
         if self._over:
-            raise FileError(f"{self._file.path}: {ENDED}")
+            return len(data)
         self._waiting.append(bytes(data))
         self._size += len(data)
         try:
             self.flush()
-        except FileError:
+        except FileError as error:
+            self._error = error
             if sum(map(len, self._waiting)) > MAX_WAITING:
                 self._over = True
                 self._waiting.clear()
-                raise FileError(f"{self._file.path}: {ENDED}") from None
-            if not self._told:
-                self._told = True
-                raise
         return len(data)
+
+    def check(self) -> None:
+        """Raise the FileError of a full disk once per time that it is full, or, when the file has
+        ended, each time."""
+        if self._over:
+            raise FileError(f"{self._file.path}: {ENDED}")
+        if self._error is not None and not self._told:
+            self._told = True
+            raise self._error
 
     def flush(self) -> None:
         """Write what waits."""
         while self._waiting:
             self._file.write(self._waiting[0])
             self._waiting.popleft()
-            self._told = False
+        self._error, self._told = None, False
 
     def tell(self) -> int:
         """How many bytes were given."""
