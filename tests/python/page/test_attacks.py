@@ -26,7 +26,7 @@ from small_models import prebuilt
 def scene(tmp_path_factory) -> Path:
     path: Path = tmp_path_factory.mktemp("scene") / "one.toml"
     path.write_text(
-        "[scene]\nframes = 10\nquiet_frames = 16\nelements = 1500\nrate_hz = 50.0\n"
+        "[scene]\nframes = 10\nquiet_frames = 16\nelements = 1500\nrate_hz = 40.0\n"
         "[[touch]]\nx_mm = 20.0\ny_mm = 0.0\nradius_mm = 9.0\n"
     )
     return path
