@@ -32,8 +32,10 @@ int main(void)
     for (size_t k = 0; k < sizeof SIZES / sizeof *SIZES; ++k) {
         const size *s = &SIZES[k];
         const size_t cells = (size_t)s->pixels_across * s->pixels_across;
-        const size_t ram = EITS_WORKSPACE_SIZE(s->rows, s->folded, s->rank, s->pixels, cells, 0);
-        const size_t host = EITS_WORKSPACE_SIZE(s->rows, s->folded, s->rank, s->pixels, cells, 1);
+        const size_t ram =
+            EITS_WORKSPACE_SIZE(s->rows, s->folded, s->rank, s->pixels, cells, s->electrodes, 0);
+        const size_t host =
+            EITS_WORKSPACE_SIZE(s->rows, s->folded, s->rank, s->pixels, cells, s->electrodes, 1);
         printf("| %s | %u x %u | %zu | %zu | %zu | %zu |\n", s->name, (unsigned)s->rank,
                (unsigned)s->pixels, ram / 1000, host / 1000, model_bytes(s, 4) / 1000,
                model_bytes(s, 1) / 1000);

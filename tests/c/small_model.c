@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char TAGS[SMALL_SECTIONS + 1][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU",
+static const char TAGS[SMALL_SECTIONS + 2][5] = {"DIMS", "PROT", "FOLD", "VREF", "REDU",
                                                  "SENS", "COLW", "GRID", "DEFS", "GOLD",
-                                                 "SCAL", "WHIT", "META", "FLDS"};
+                                                 "SCAL", "WHIT", "META", "FLDS", "XTRS"};
 enum { DIMS, PROT, FOLD, VREF, REDU, SENS, COLW, GRID, DEFS, GOLD, SCAL, WHIT, META, FLDS };
 
 void *small_aligned(void **memory, size_t size)
@@ -303,7 +303,7 @@ static int fill_row_form(const small_spec *spec, const double *s, uint32_t n, ui
 
 /* Returns whether the model says how it was whitened. */
 static int fill_sections(const small_spec *spec, uint32_t stride,
-                         uint8_t *const at[SMALL_SECTIONS + 1])
+                         uint8_t *const at[SMALL_SECTIONS + 2])
 {
     uint32_t cells[64 * 64];
     const uint32_t n = kept_cells(spec, cells);
@@ -392,9 +392,9 @@ small_model small_model_make(small_spec spec)
     uint32_t cells[64 * 64];
     if (spec.side > 64)
         abort();
-    const uint32_t sections = SMALL_SECTIONS + (spec.fields != 0);
+    const uint32_t sections = SMALL_SECTIONS + (spec.fields == 0 ? 0 : spec.spare == 0 ? 1u : 2u);
     const uint32_t n = kept_cells(&spec, cells), stride = (spec.rank + 7u) & ~7u;
-    const uint32_t sizes[SMALL_SECTIONS + 1] = {64,
+    const uint32_t sizes[SMALL_SECTIONS + 2] = {64,
                                                 SMALL_ROWS * 4,
                                                 SMALL_FOLDED * 8,
                                                 SMALL_FOLDED * 4,
@@ -407,9 +407,10 @@ small_model small_model_make(small_spec spec)
                                                 n * 4,
                                                 16 + 16 * stride,
                                                 2,
-                                                16 + n * SMALL_FIELDS_STRIDE * 2};
+                                                16 + n * SMALL_FIELDS_STRIDE * 2,
+                                                16};
     const int integer = spec.storage == EITS_STORAGE_I16 || spec.storage == EITS_STORAGE_I8;
-    uint8_t *at[SMALL_SECTIONS + 1] = {NULL};
+    uint8_t *at[SMALL_SECTIONS + 2] = {NULL};
     small_model made = small_model_lay_out(sections, TAGS, sizes, SCAL + (integer != 0), at);
     if (!integer) /* an absent scale is written under a tag that readers skip */
         memcpy(small_model_entry(&made, "SCAL"), "XTRA", 4);

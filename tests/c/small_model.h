@@ -43,6 +43,7 @@ typedef struct small_spec {
     float pixel_mm; /* 0: 6 mm */
     /* with section FLDS: currents at points on a circle around the image, whose mirror it is */
     int fields;
+    int spare; /* with fields: one more section that readers skip, XTRS, to be replaced */
 } small_spec;
 
 typedef struct small_model {

@@ -4,7 +4,7 @@
 static dense_bench b;
 
 /* The size is a constant expression: this compiles only if it is. */
-static uint8_t constant[EITS_WORKSPACE_SIZE(40, 21, 12, 36, 36, 1)];
+static uint8_t constant[EITS_WORKSPACE_SIZE(40, 21, 12, 36, 36, 0, 1)];
 
 /* The workspace of a model is as large as the macro says, and ends where its last array ends. */
 static void check_size(small_spec spec, int prepared)
@@ -13,8 +13,9 @@ static void check_size(small_spec spec, int prepared)
     eits_model m;
     CHECK_OK(eits_model_open(&m, made.blob, made.size));
     const size_t size = eits_workspace_size(&m, prepared);
-    CHECK_EQUAL(size, EITS_WORKSPACE_SIZE(m.n_rows, m.n_folded, m.rank, m.n_pixels,
-                                          (size_t)m.nx * m.ny, prepared));
+    CHECK_EQUAL(size,
+                EITS_WORKSPACE_SIZE(m.n_rows, m.n_folded, m.rank, m.n_pixels, (size_t)m.nx * m.ny,
+                                    m.fields.at.data != NULL ? m.n_electrodes : 0, prepared));
     CHECK_EQUAL(size % 16, 0);
     void *memory;
     eits_context *ctx;

@@ -1,4 +1,5 @@
-/* Section MOVE, and what the reference makes of it: places go to where touches lie, and back. */
+/* Sections MOVE and ROWE, and what the reference makes of them: places go to where touches lie, and
+ * back. */
 #include "check.h"
 #include "small_model.h"
 
@@ -15,7 +16,8 @@
 enum { RANK = 4, ERRORS = 16 + 4 * RANK * (RANK + 1), ROWS = 2, TERM = 8 * ROWS, DEGREES = 5 };
 enum { HEAD = 16, FOLDS = HEAD + 4 * ROWS * SMALL_FOLDED };
 static const uint32_t TERMS[DEGREES] = {1, 3, 6, 10, 15};
-static const small_spec SPEC = {.rank = RANK, .side = 5, .shape = SMALL_WHITENED, .fields = 1};
+static const small_spec SPEC = {
+    .rank = RANK, .side = 5, .shape = SMALL_WHITENED, .fields = 1, .spare = 1};
 
 /* `model` with section `tag` in the place of section `old`. */
 static small_model with(small_model *model, const char *old, const char *tag, const void *bytes,
@@ -115,6 +117,88 @@ TEST(moves_of_another_size_without_places_or_out_of_range_are_refused)
         small_put_f32(small_model_section(&made, "MOVE", &size) + FOLDS + 3 * TERM - 4, odd[k]);
         small_model_seal(&made);
         CHECK_EQUAL(opens(made, &model), EITS_E_MODEL_VALUE);
+    }
+}
+
+enum { COUNT = 3, SEEN = 2, ROWE_FOLDS = 4 * (COUNT + SEEN) * SMALL_FOLDED };
+
+/* Section ROWE beside MOVE of `terms` terms (0: without it): number i after the head is i / 16. */
+static small_model with_row_errors(uint32_t terms, const uint32_t head[3], float distance,
+                                   uint32_t size)
+{
+    static uint8_t bytes[HEAD + ROWE_FOLDS + 4 * 4 * 17 * SEEN];
+    for (int i = 0; i < 3; ++i)
+        small_put_u32(bytes + 4 * i, head[i]);
+    small_put_f32(bytes + 12, distance);
+    for (uint32_t i = 0; i < (sizeof bytes - HEAD) / 4; ++i)
+        small_put_f32(bytes + HEAD + 4 * i, (float)i / 16);
+    small_model made = terms > 0 ? with_terms(terms) : with_places(1);
+    return with(&made, "XTRS", "ROWE", bytes, size);
+}
+
+/* Its size for 6 terms. */
+enum { ROWE_SIZE = HEAD + ROWE_FOLDS + 4 * 4 * 6 * SEEN };
+static const uint32_t ROWE_HEAD[3] = {COUNT, SEEN, 6};
+
+TEST(row_errors_are_read_in_place)
+{
+    small_model made = with_row_errors(6, ROWE_HEAD, 0.18f, ROWE_SIZE);
+    eits_model model;
+    CHECK_OK(eits_model_open(&model, made.blob, made.size));
+    const eits_row_errors *e = &model.row_errors;
+    CHECK(e->count == COUNT && e->move_rows == SEEN && e->distance == 0.18f);
+    CHECK((const uint8_t *)e->vectors == small_model_section(&made, "ROWE", NULL) + HEAD);
+    CHECK(e->vectors[5] == 5 / 16.0f && e->moved - e->vectors == COUNT * SMALL_FOLDED &&
+          e->moves[0] - e->moved == SEEN * SMALL_FOLDED && e->moves[1] - e->moves[0] == 12 * SEEN);
+    small_model_free(&made);
+    made = with_terms(6); /* a model may lack them */
+    CHECK_OK(eits_model_open(&model, made.blob, made.size));
+    CHECK(model.row_errors.vectors == NULL && model.row_errors.move_rows == 0);
+    small_model_free(&made);
+}
+
+TEST(row_errors_of_another_size_without_moves_or_out_of_range_are_refused)
+{
+    static const struct {
+        uint32_t terms, head[3], size;
+    } of_size[] = {{6, {COUNT, SEEN, 6}, 0},
+                   {6, {COUNT, SEEN, 6}, HEAD - 4},
+                   {6, {COUNT, SEEN, 6}, HEAD},
+                   {6, {COUNT, SEEN, 6}, ROWE_SIZE - 4},
+                   {6, {COUNT, SEEN, 6}, ROWE_SIZE + 4},
+                   {6, {0, SEEN, 6}, ROWE_SIZE},
+                   {6, {0, SEEN, 6}, ROWE_SIZE - 4 * COUNT * SMALL_FOLDED},
+                   {6, {COUNT, 0, 6}, HEAD + 4 * COUNT * SMALL_FOLDED},
+                   {6, {COUNT + 1, SEEN, 6}, ROWE_SIZE},
+                   {6, {COUNT, SEEN + 1, 6}, ROWE_SIZE},
+                   {6, {EITS_MAX_PLACE_ROWS + 1, SEEN, 6}, ROWE_SIZE},
+                   {6, {COUNT, EITS_MAX_PLACE_ROWS + 1, 6}, ROWE_SIZE},
+                   {6, {0x80000000u, 0x80000000u, 6}, ROWE_SIZE},
+                   {6, {COUNT, SEEN, 0}, HEAD + ROWE_FOLDS},
+                   /* other terms than MOVE has, and no MOVE */
+                   {6, {COUNT, SEEN, 3}, HEAD + ROWE_FOLDS + 4 * 4 * 3 * SEEN},
+                   {3, {COUNT, SEEN, 6}, ROWE_SIZE},
+                   {0, {COUNT, SEEN, 6}, ROWE_SIZE},
+                   {0, {COUNT, SEEN, 0}, HEAD + ROWE_FOLDS}};
+    eits_model model;
+    for (size_t k = 0; IN_TABLE(k, of_size); ++k)
+        CHECK_EQUAL(
+            opens(with_row_errors(of_size[k].terms, of_size[k].head, 0.18f, of_size[k].size),
+                  &model),
+            EITS_E_MODEL_SECTION);
+    const float distances[] = {0, -1, 1e-7f, 2e6f, (float)NAN, (float)INFINITY};
+    for (size_t k = 0; IN_TABLE(k, distances); ++k)
+        CHECK_EQUAL(opens(with_row_errors(6, ROWE_HEAD, distances[k], ROWE_SIZE), &model),
+                    EITS_E_MODEL_VALUE);
+    const float odd[] = {2e6f, -2e6f, (float)NAN};
+    const uint32_t at[] = {HEAD, HEAD + ROWE_FOLDS - 4, ROWE_SIZE - 4};
+    for (size_t k = 0; IN_TABLE(k, odd); ++k) {
+        for (int place = 0; place < 3; ++place) {
+            small_model made = with_row_errors(6, ROWE_HEAD, 0.18f, ROWE_SIZE);
+            small_put_f32(small_model_section(&made, "ROWE", NULL) + at[place], odd[k]);
+            small_model_seal(&made);
+            CHECK_EQUAL(opens(made, &model), EITS_E_MODEL_VALUE);
+        }
     }
 }
 
@@ -226,7 +310,7 @@ TEST(rows_with_gains_of_their_own_are_corrected_less)
     small_context_open(&c, &made, 0);
     const double of[] = {0, 0.03, 0.1};
     for (int k = 0; k < 3; ++k) {
-        eits_place_sums sums = {{2, 0}, {3, 0}, {0}};
+        eits_place_sums sums = {{2, 0}, {3, 0}, {0}, {0}};
         eits_add_log_gain(&c.model, 0, (eits_real)of[k], &sums);
         const double spread = (double)EITS_ROW_SPREAD,
                      trust = pow(spread * spread / (spread * spread + of[k] * of[k]), 2);
@@ -235,6 +319,56 @@ TEST(rows_with_gains_of_their_own_are_corrected_less)
         CHECK_NEAR(c.ctx->reference.shift_mm[0][0], -7.5 * (3 + 0.2 * of[k]) * trust, 1e-4);
         CHECK_NEAR(c.ctx->reference.place_mm2, pow(2 + 0.2 * of[k], 2), 1e-5);
     }
+    small_context_close(&c);
+    small_model_free(&made);
+}
+
+/* With fields and row errors, the correction is of touches that are fitted jointly: on a skin near
+ * the model of those in white noise, on one that is far of those with the model's errors. */
+TEST(touches_that_are_fitted_jointly_have_corrections_of_their_own)
+{
+    static float rowe[COUNT * SMALL_FOLDED + SEEN * SMALL_FOLDED + 4 * 3 * SEEN];
+    const double part[] = {0.01, 0.1};
+    small_model made = with_terms(3);
+    small_context c;
+    small_context_open(&c, &made, 0);
+    for (uint32_t i = 0; i < sizeof rowe / sizeof rowe[0]; ++i)
+        rowe[i] = (float)(i % 17) / 16;
+    float *seen = rowe + COUNT * SMALL_FOLDED, *moves = seen + SEEN * SMALL_FOLDED;
+    const uint16_t stored = 0;
+    for (int far = 0; far < 2; ++far) {
+        double y[SMALL_FOLDED], z[ROWS], sums[SEEN] = {0}, square = 0, of_model = 0;
+        for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+            const double v = (double)c.model.v_ref[k];
+            y[k] = log(1 + part[far] * sin(k));
+            of_model += v * v;
+            square += pow(v * (1 + part[far] * sin(k)), 2);
+        }
+        for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+            for (uint32_t j = 0; j < SEEN; ++j)
+                sums[j] += (y[k] + 0.5 * log(of_model / square)) * (double)seen[SEEN * k + j];
+        }
+        for (int joint = 0; joint < 2; ++joint) {
+            c.model.row_errors = (eits_row_errors){.vectors = joint ? rowe : NULL,
+                                                   .count = COUNT,
+                                                   .distance = 0.1f,
+                                                   .moved = joint ? seen : NULL,
+                                                   .moves = {moves, moves + 2 * 3 * SEEN},
+                                                   .move_rows = joint ? SEEN : 0};
+            c.model.fields.at.data = joint ? &stored : NULL;
+            take_reference(&c, part[far], z);
+            CHECK_EQUAL(eits_may_fit_jointly(c.ctx), joint);
+            CHECK_EQUAL(eits_weighs_errors(c.ctx), far);
+            for (int t = 0; t < 3; ++t) {
+                const float *u =
+                    joint ? moves + (6 * far + t) * SEEN : c.model.uncertainty.moves + t * ROWS;
+                const double *of = joint ? sums : z;
+                CHECK_NEAR(c.ctx->reference.shift_mm[0][t],
+                           -((double)u[0] * of[0] + (double)u[1] * of[1]), 3e-3);
+            }
+        }
+    }
+    c.model.fields.at.data = NULL;
     small_context_close(&c);
     small_model_free(&made);
 }

@@ -426,11 +426,11 @@ TEST(options_have_ranges)
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     eits_options o;
     CHECK_EQUAL(eits_options_default(&b.c.model, &o), EITS_OK);
-    CHECK(o.touch_fit == EITS_TOUCH_FIT_ALL && EITS_TOUCH_FIT_ALL == 7 && o.second_pass == 0);
-    for (uint32_t bits = 0; bits < 10; ++bits) {
+    CHECK(o.touch_fit == EITS_TOUCH_FIT_ALL && EITS_TOUCH_FIT_ALL == 39 && o.second_pass == 0);
+    for (uint32_t bits = 0; bits < 70; ++bits) {
         o.touch_fit = bits;
         CHECK_EQUAL(eits_set_options(ctx, &o),
-                    bits <= EITS_TOUCH_FIT_ALL ? EITS_OK : EITS_E_ARGUMENT);
+                    (bits & ~EITS_TOUCH_FIT_ALL) == 0 ? EITS_OK : EITS_E_ARGUMENT);
     }
     o.touch_fit = 0;
     o.second_pass = 1;

@@ -131,8 +131,8 @@ typedef struct eits_info {
     /* fraction of |d| above noise that lies outside the model's range, 0 to 1; 0 if it was not
      * examined */
     eits_real model_mismatch;
-    /* fraction of |y|^2 that the touches do not explain, set by eits_find_touches; 0 if no touches
-     * were looked for */
+    /* fraction of |y|^2 that the touches do not explain, or of |d|^2 where they were fitted
+     * jointly; set by eits_find_touches; 0 if no touches were looked for */
     eits_real unexplained;
     /* bit e: electrode e, of the first 64; eits_get_electrode_states has all */
     uint64_t open_electrodes;

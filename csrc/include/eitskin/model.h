@@ -198,6 +198,21 @@ typedef struct eits_uncertainty {
     uint32_t move_terms;           /* 1, 3, 6, 10 or EITS_MAX_MOVE_TERMS; 0: none */
 } eits_uncertainty;
 
+/* What the joint fit of touches, which works on folded rows, knows of skins that differ from the
+ * model (section ROWE). */
+typedef struct eits_row_errors {
+    /* e_1 ... e_count, n_folded x count, fold by fold: where y = log(v0 / v_ref) has the rms
+     * `distance`, the second moment of (d_true - d_model) / |d_model| is the sum of e e'. NULL: not
+     * known */
+    const float *vectors;
+    uint32_t count; /* at most EITS_MAX_PLACE_ROWS */
+    float distance;
+    /* M and U as in eits_uncertainty, with its move_terms: U for touches fitted in white noise, and
+     * for touches fitted with these errors */
+    const float *moved, *moves[2];
+    uint32_t move_rows; /* at most EITS_MAX_PLACE_ROWS */
+} eits_row_errors;
+
 /* An open model. All pointers go into the blob; a caller reads it and never writes it. */
 typedef struct eits_model {
     uint32_t n_electrodes; /* the protocol's table counts them from 0 */
@@ -233,6 +248,7 @@ typedef struct eits_model {
     eits_force force;
     eits_row_form row_form;
     eits_uncertainty uncertainty;
+    eits_row_errors row_errors;
     /* n_folded (n_folded + 1) / 2: the lower triangle, by rows, of the inverse R of the covariance
      * of the rows' noise; P whitens that noise, P R^-1 P' = I (section PREC of taught models).
      * NULL: not known */

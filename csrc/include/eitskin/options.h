@@ -51,9 +51,12 @@ typedef enum eits_touch_fit {
     EITS_TOUCH_FIT_SPLIT_MERGE = 2,
     /* take the interaction of touches (each changes the field at the others) out of the data; for
      * models of difference data with fields */
-    EITS_TOUCH_FIT_INTERACTION = 4
+    EITS_TOUCH_FIT_INTERACTION = 4,
+    /* fit all touches at once by multipoles: places, radii and ellipses; for models with fields,
+     * model errors and row errors, and with touch_test */
+    EITS_TOUCH_FIT_JOINT = 32
 } eits_touch_fit;
-#define EITS_TOUCH_FIT_ALL 7u
+#define EITS_TOUCH_FIT_ALL 39u
 
 /* The options. Lambdas are in the units of S'y. docs/reference/options.md lists default values and
  * ranges. */

@@ -46,6 +46,27 @@ extern "C" {
  * sixteen. */
 #define EITS_EVIDENCE_COLUMNS 64u
 
+/* Parameters of all touches that the joint fit has room for: twelve discs or eight ellipses; and
+ * folds whose columns it holds at a time. */
+#define EITS_JOINT_PARAMETERS 48u
+#define EITS_JOINT_BLOCK      112u
+
+/* What no touch causes: the drift of the gain, and the model's errors. */
+#define EITS_JOINT_NUISANCES (1u + 32u)
+
+/* Numbers in the lower triangle of the joint fit's normal equations. */
+#define EITS_JOINT_TRIANGLE (EITS_JOINT_PARAMETERS * (EITS_JOINT_PARAMETERS + 1u) / 2u)
+
+/* Complex numbers of one touch in the multipole model: EITS_POLE_TERMS of each electrode's field,
+ * and EITS_POLE_SENT that it sends to others (csrc/src/multipole/multipole.h). */
+#define EITS_POLE_TERMS                6u
+#define EITS_POLE_SENT                 3u
+#define EITS_POLE_FIELD(n_electrodes)  (2u * EITS_POLE_TERMS * (size_t)(n_electrodes))
+#define EITS_POLE_SOURCE(n_electrodes) (2u * EITS_POLE_SENT * (size_t)(n_electrodes))
+
+/* What the joint fit needs, where the model has fields. */
+#define EITS_JOINT_IF(n_electrodes, count) ((n_electrodes) > 0 ? (count) : 0u)
+
 /* Columns of a panel: S in panels has that many columns side by side, row after row, so that a
  * product S'v fills vector registers without gathering. */
 #define EITS_PANEL 32u
@@ -56,9 +77,9 @@ extern "C" {
 
 /* Every array: ARRAY(place, element, count), in the order in which they lie in memory. `place` is
  * the member of the context that points to it; csrc/src/context/context.h says what is in it.
- * n_cells is nx * ny. */
+ * n_cells is nx * ny; n_electrodes is 0 for a model without fields. */
 /* clang-format off */
-#define EITS_WORKSPACE_ARRAYS(ARRAY, n_rows, n_folded, rank, n_pixels, n_cells)                    \
+#define EITS_WORKSPACE_ARRAYS(ARRAY, n_rows, n_folded, rank, n_pixels, n_cells, n_electrodes)      \
     /* from a cell of the image to its pixel */                                                    \
     ARRAY(cell, uint16_t, n_cells)                                                                 \
     /* scratch: vectors that solvers, fit and test borrow from each other in turn */               \
@@ -112,6 +133,19 @@ extern "C" {
     ARRAY(evidence.data, eits_real, EITS_STRIDE(rank))                                             \
     ARRAY(evidence.left, eits_real, EITS_STRIDE(rank))                                             \
     ARRAY(evidence.gain_drift, eits_real, EITS_STRIDE(rank))                                       \
+    /* the multipole model: polynomials of the fields, and what touches send to each other */      \
+    ARRAY(multipole.home, eits_real, EITS_MAX_TOUCHES * EITS_POLE_FIELD(n_electrodes))             \
+    ARRAY(multipole.induced, eits_real, EITS_MAX_TOUCHES * EITS_POLE_FIELD(n_electrodes))          \
+    ARRAY(multipole.sent, eits_real, EITS_MAX_TOUCHES * EITS_POLE_SOURCE(n_electrodes))            \
+    ARRAY(multipole.work, eits_real, 6u * EITS_POLE_FIELD(n_electrodes))                           \
+    /* the joint fit: a metric, columns of one block of folds, and the normal equations */         \
+    ARRAY(joint.weight, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                           \
+    ARRAY(joint.drift, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                            \
+    ARRAY(joint.column, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_PARAMETERS * EITS_JOINT_BLOCK)) \
+    ARRAY(joint.along, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_PARAMETERS * EITS_JOINT_NUISANCES)) \
+    ARRAY(joint.nuisance, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_NUISANCES * (EITS_JOINT_NUISANCES + 1u) / 2u)) \
+    ARRAY(joint.normal, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_TRIANGLE))               \
+    ARRAY(joint.factor, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_TRIANGLE))               \
     /* columns of S as floats, and which they are */                                               \
     ARRAY(columns.data, float, EITS_CACHED(n_pixels) * EITS_STRIDE(rank))                          \
     ARRAY(columns.slot, uint16_t, n_pixels)                                                        \
@@ -132,8 +166,8 @@ extern "C" {
 
 /* Pointers to the arrays above; 14 more, to the model and its S, to the kernels, and to what the
  * solvers and the whitening borrow. */
-#define EITS_CONTEXT_POINTERS                                               \
-    (14u * sizeof(void *) EITS_WORKSPACE_ARRAYS(EITS_ADD_POINTER, , , , , ) \
+#define EITS_CONTEXT_POINTERS                                                 \
+    (14u * sizeof(void *) EITS_WORKSPACE_ARRAYS(EITS_ADD_POINTER, , , , , , ) \
                EITS_PREPARED_ARRAYS(EITS_ADD_POINTER, , ))
 
 /* A touch that is followed: the touch, five numbers for its speed and covariance, and three counts,
@@ -147,18 +181,24 @@ extern "C" {
 #define EITS_CONTEXT_NUMBERS \
     ((20u + 2u * EITS_MAX_MOVE_TERMS) * sizeof(eits_real) + (34u + 12u) * sizeof(uint32_t))
 
+/* The multipole model keeps a pixel and a mirror per touch, the joint fit its gradient. */
+#define EITS_JOINT_NUMBERS                                            \
+    (EITS_MAX_TOUCHES * (4u * sizeof(eits_real) + sizeof(uint32_t)) + \
+     (EITS_JOINT_PARAMETERS + 1u) * sizeof(eits_real) + sizeof(uint32_t))
+
 /* Bytes of the context, at the workspace's start. csrc/src/api/setup.c asserts that it fits, and
  * that little is left over. */
 #define EITS_CONTEXT_SIZE                                                         \
     EITS_ALIGN16(sizeof(eits_options) + sizeof(eits_info) + EITS_MAX_ELECTRODES + \
                  EITS_MAX_TOUCHES * EITS_FOLLOWED_SIZE + EITS_CONTEXT_POINTERS +  \
-                 EITS_CONTEXT_NUMBERS)
+                 EITS_CONTEXT_NUMBERS + EITS_JOINT_NUMBERS)
 
-/* Bytes of a workspace; n_cells is nx * ny. `prepared` is 1 to keep S and the working set's columns
- * in panels as well, which is faster on hosts, else 0. */
-#define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, prepared)               \
+/* Bytes of a workspace; n_cells is nx * ny; n_electrodes is 0 for a model without fields (section
+ * FLDS), whose touches are not fitted jointly. `prepared` is 1 to keep S and the working set's
+ * columns in panels as well, which is faster on hosts, else 0. */
+#define EITS_WORKSPACE_SIZE(n_rows, n_folded, rank, n_pixels, n_cells, n_electrodes, prepared) \
     (EITS_CONTEXT_SIZE EITS_WORKSPACE_ARRAYS(EITS_ADD_BYTES, n_rows, n_folded, rank, n_pixels, \
-                                             n_cells) +                                        \
+                                             n_cells, n_electrodes) +                          \
      ((prepared) ? EITS_LINE - 16u EITS_PREPARED_ARRAYS(EITS_ADD_BYTES, rank, n_pixels) : 0u))
 
 #ifdef __cplusplus

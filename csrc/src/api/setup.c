@@ -13,12 +13,18 @@
 _Static_assert(sizeof(eits_context) <= EITS_CONTEXT_SIZE, "EITS_CONTEXT_SIZE is too small");
 _Static_assert(sizeof(eits_context) + 128 > EITS_CONTEXT_SIZE, "EITS_CONTEXT_SIZE wastes memory");
 
+/* Electrodes whose fields the model has. */
+static uint32_t poles_of(const eits_model *model)
+{
+    return model->fields.at.data != NULL ? model->n_electrodes : 0;
+}
+
 size_t eits_workspace_size(const eits_model *model, int prepared)
 {
     if (model == NULL)
         return 0;
     return EITS_WORKSPACE_SIZE(model->n_rows, model->n_folded, model->rank, model->n_pixels,
-                               (size_t)model->nx * model->ny, prepared);
+                               (size_t)model->nx * model->ny, poles_of(model), prepared);
 }
 
 /* Take the next part of the workspace and clear it, so that no result depends on the earlier
@@ -39,7 +45,8 @@ static void *take(uint8_t **next, size_t bytes)
 static void lay_out(eits_context *ctx, uint8_t **next)
 {
     const eits_model *m = ctx->model;
-    EITS_WORKSPACE_ARRAYS(TAKE, m->n_rows, m->n_folded, m->rank, m->n_pixels, (size_t)m->nx * m->ny)
+    EITS_WORKSPACE_ARRAYS(TAKE, m->n_rows, m->n_folded, m->rank, m->n_pixels, (size_t)m->nx * m->ny,
+                          poles_of(m))
 }
 
 /* Panels begin at a line of the processor's cache, so that none of their vectors lies across two
@@ -102,6 +109,8 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
     lend(made);
     map_cells(model, made->cell);
     eits_clear_column_cache(&made->columns);
+    for (uint32_t k = 0; k < EITS_MAX_TOUCHES; ++k)
+        made->multipole.home_pixel[k] = EITS_NO_HOME;
     /* 1 and not 0: a model without row gains multiplies by these numbers too, which leaves the bits
      * unchanged */
     for (uint32_t i = 0; i < model->n_rows; ++i)

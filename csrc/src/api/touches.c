@@ -14,6 +14,7 @@
 #include "diagnostics/diagnostics.h"
 #include "evidence/evidence.h"
 #include "frame/reference.h"
+#include "joint/joint.h"
 #include "touch/disc.h"
 #include "touch/disc_fit.h"
 
@@ -23,6 +24,29 @@ static int may_have_touches(const eits_context *ctx)
     const eits_stop stop = ctx->info.stop;
     return stop != EITS_STOP_BELOW_THRESHOLD && stop != EITS_STOP_ZERO &&
            stop != EITS_STOP_DIVERGED;
+}
+
+/* Fit discs, and all of them jointly; discs that this does not make clear are tested before.
+ * Whether they are crowded is checked by discs, on which its odds were counted. `found` is
+ * overwritten. */
+static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
+                         eits_touch *found)
+{
+    eits_joint j;
+    eits_fit_touches(ctx, scratch, f);
+    ctx->info.unexplained = f->total > 0 ? eits_fit_left(ctx, f) / f->total : 0;
+    ctx->evidence.spent = 0; /* where no test is needed */
+    const int clear = eits_fit_clearly(ctx, f, &j);
+    if (!clear) {
+        eits_test_touches(ctx, scratch, f);
+        eits_rate_touches(ctx, f);
+        eits_fit_centre(ctx, scratch, f);
+        eits_place_touches(ctx, scratch, f);
+        ctx->info.unexplained = f->total > 0 ? eits_fit_left(ctx, f) / f->total : 0;
+    }
+    eits_check_crowd(ctx, found, eits_report_touches(ctx, f, found));
+    if (!clear)
+        eits_fit_jointly(ctx, f, &j);
 }
 
 eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t room,
@@ -36,15 +60,13 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     /* An image that is zero for the reason given by info.stop has no touches. Tracked touches are
      * then held or dropped like any that are not found. */
     ctx->info.unexplained = 0;
+    eits_check_crowd(ctx, found, 0); /* CROWDED only of this frame's touches */
     if (may_have_touches(ctx)) {
-        eits_fit_touches(ctx, scratch, &f);
-        eits_test_touches(ctx, scratch, &f);
-        eits_rate_touches(ctx, &f);
-        eits_fit_centre(ctx, scratch, &f);
-        eits_place_touches(ctx, scratch, &f);
-        ctx->info.unexplained = f.total > 0 ? eits_fit_left(ctx, &f) / f.total : 0;
-        if (eits_check_drift(ctx))
+        fit_and_test(ctx, scratch, &f, found);
+        if (eits_check_drift(ctx)) {
             f.count = 0;
+            eits_check_crowd(ctx, found, 0);
+        }
     }
     const uint32_t finite = eits_report_touches(ctx, &f, found);
     for (uint32_t k = 0; f.tested && k < finite; ++k) {
@@ -54,7 +76,6 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         found[k].y_mm = at[1];
     }
     ctx->info.touch_macs = f.macs;
-    eits_check_crowd(ctx, found, finite);
     eits_check_count(ctx, &f);
     /* The checks above use this frame's touches; tracking may hide some of them and add others. */
     const uint32_t next_id = ctx->tracker.next_id;

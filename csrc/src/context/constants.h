@@ -14,6 +14,11 @@
  * moves touches; smaller: misplaced electrodes do */
 #define EITS_MAX_SHIFT R(1.0)
 
+/* the joint fit weighs the model's errors where the reference is further from the model
+ * [row_errors.distance]. larger: uneven skins are fitted as if they were the model; smaller: good
+ * skins lose data */
+#define EITS_ERRORS_FROM R(0.33)
+
 /* clang-format on */
 
 #endif

@@ -192,6 +192,31 @@ typedef struct eits_evidence {
     uint32_t places_made;  /* 1: column has those of the next answer's discs without their shapes */
 } eits_evidence;
 
+/* Memory of the multipole model: L electrodes, slots of EITS_POLE_FIELD(L) numbers. Written by
+ * multipole. */
+typedef struct eits_multipole {
+    eits_real *home;    /* EITS_MAX_TOUCHES slots: the fields about each touch's home pixel */
+    eits_real *induced; /* EITS_MAX_TOUCHES slots: what comes in from other touches and the rim */
+    eits_real *sent;    /* EITS_MAX_TOUCHES x EITS_POLE_SOURCE(L): what each sends out */
+    eits_real *work;    /* 6 slots, in disorder after each call */
+    uint32_t home_pixel[EITS_MAX_TOUCHES]; /* EITS_NO_HOME: none is kept */
+    eits_real mirror[EITS_MAX_TOUCHES][4]; /* a and b of the rim's mirror there, mm */
+} eits_multipole;
+#define EITS_NO_HOME UINT32_MAX
+
+/* Memory of the joint fit. Written by joint. */
+typedef struct eits_joint_memory {
+    eits_real *weight; /* n_folded: 1 / sigma; 0 for a fold that is left out */
+    eits_real *drift;  /* n_folded: the direction of the gain's drift in that metric, of length 1 */
+    eits_real *column; /* EITS_JOINT_PARAMETERS x EITS_JOINT_BLOCK */
+    eits_real *along;  /* EITS_JOINT_PARAMETERS x EITS_JOINT_NUISANCES */
+    eits_real *nuisance; /* their factor L, packed by rows (joint/metric.c) */
+    uint32_t errors;     /* vectors of the model's errors in use */
+    eits_real error_unit;
+    eits_real *normal, *factor; /* EITS_JOINT_TRIANGLE each, packed by rows */
+    eits_real gradient[EITS_JOINT_PARAMETERS];
+} eits_joint_memory;
+
 /* A touch that is followed (touch/disc.h). */
 typedef struct eits_followed {
     eits_touch touch;       /* as reported; id 0: not yet */
@@ -238,6 +263,8 @@ struct eits_context {
     eits_solve_state solver;
     eits_touch_memory touch;
     eits_evidence evidence;
+    eits_multipole multipole;
+    eits_joint_memory joint;
     eits_tracker tracker;
     eits_scratch scratch;
 };

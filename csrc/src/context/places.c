@@ -36,6 +36,19 @@ static void shift_at(const eits_context *ctx, const eits_real at[2], eits_real s
     shift[1] = eits_clamp(shift[1], -reach, reach);
 }
 
+int eits_may_fit_jointly(const eits_context *ctx)
+{
+    const eits_model *model = ctx->model;
+    return (ctx->options.touch_fit & EITS_TOUCH_FIT_JOINT) != 0 &&
+           model->data_kind == EITS_DATA_DIFFERENCE && model->fields.at.data != NULL &&
+           model->row_errors.vectors != NULL;
+}
+
+uint32_t eits_weighs_errors(const eits_context *ctx)
+{
+    return ctx->reference.distance > EITS_ERRORS_FROM * (eits_real)ctx->model->row_errors.distance;
+}
+
 int eits_corrects_places(const eits_context *ctx)
 {
     return ctx->reference.row_gains && ctx->model->uncertainty.move_terms > 0;

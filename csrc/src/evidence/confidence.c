@@ -39,6 +39,11 @@ static eits_real variance_of_all(const eits_context *ctx)
     return floor + eits_fma(trust, EITS_PLACE_GEOMETRY * b->place_mm2 - stays, stays);
 }
 
+eits_real eits_confidence(eits_real rise)
+{
+    return rise > 0 ? 1 - EITS_CONFIDENCE_HALF / (rise + EITS_CONFIDENCE_HALF) : 0;
+}
+
 void eits_rate_touches(const eits_context *ctx, eits_fit *f)
 {
     const eits_real least = variance_of_all(ctx),
@@ -54,9 +59,7 @@ void eits_rate_touches(const eits_context *ctx, eits_fit *f)
             place[1] = eits_fma(EITS_PLACE_FACTOR, place[1], x * y);
             place[2] = eits_fma(EITS_PLACE_FACTOR, place[2], eits_fma(y, y, least));
         }
-        const eits_real rise = f->rise[k];
-        f->confidence[k] =
-            f->tested && rise > 0 ? 1 - EITS_CONFIDENCE_HALF / (rise + EITS_CONFIDENCE_HALF) : 0;
+        f->confidence[k] = f->tested ? eits_confidence(f->rise[k]) : 0;
     }
 }
 

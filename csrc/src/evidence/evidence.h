@@ -149,6 +149,9 @@ void eits_place_ellipse(const eits_context *ctx, const eits_disc *disc, const ei
  * wide as places err; zeros where discs were not tested. */
 void eits_rate_touches(const eits_context *ctx, eits_fit *f);
 
+/* The share of discs of such a rise that were touches. */
+eits_real eits_confidence(eits_real rise);
+
 /* f->place_mm2 of discs that were not tested, by the fit's normal equations, where the model says
  * how far to trust them. */
 void eits_place_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);

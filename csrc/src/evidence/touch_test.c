@@ -193,6 +193,8 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
     split(ctx, scratch, f, &v, &f->macs);
     const eits_real unit = eits_excess(ctx, v.answer.misfit, v.answer.count);
     f->tested = 1;
+    f->drifts = v.drift != 0;
+    f->changed = v.changed != 0;
     for (uint32_t k = 0; k < v.answer.count; ++k) {
         f->rise[k] = v.rise[k] / unit;
         memcpy(f->place_mm2[k], v.place_mm2[k], sizeof f->place_mm2[k]);

@@ -9,10 +9,13 @@
  * along either axis, with x and y from the grid's middle over half its longer side.
  * context/places.c subtracts this shift; |N'y|^2 is the variance of the remaining error. Directions
  * of y that no such skin has show how much of y comes from gains of single rows: the more, the
- * smaller the correction. python/eitskin/model/tare_places.py has the formulas. */
+ * smaller the correction. Touches that are fitted jointly, on the folds, are displaced otherwise
+ * than those of reduced data, so section ROWE has M and U of their own.
+ * python/eitskin/model/tare_places.py has the formulas. */
 #include "frame/reference.h"
 
 #include "base/vec.h"
+#include "context/places.h"
 #include "frame/constants.h"
 
 void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain,
@@ -27,6 +30,10 @@ void eits_add_log_gain(const eits_model *model, uint32_t k, eits_real log_gain,
         sums->move[j] = eits_fma((eits_real)u->moved[move + j], log_gain, sums->move[j]);
     for (uint32_t j = 0; j < u->rest_rows; ++j)
         sums->rest[j] = eits_fma((eits_real)u->rest[rest + j], log_gain, sums->rest[j]);
+    const eits_row_errors *joint = &model->row_errors;
+    const float *seen = joint->moved + (size_t)joint->move_rows * k;
+    for (uint32_t j = 0; j < joint->move_rows; ++j)
+        sums->joint[j] = eits_fma((eits_real)seen[j], log_gain, sums->joint[j]);
 }
 
 /* Returns the trust in the correction, 0 to 1: gains of single rows look like displaced electrodes,
@@ -49,12 +56,17 @@ void eits_learn_places(eits_context *ctx, const eits_place_sums *sums)
     b->place_trust = trust(u, sums->rest);
     for (uint32_t j = 0; j < u->place_rows; ++j)
         b->place_mm2 = eits_fma(sums->place[j], sums->place[j], b->place_mm2);
+    const eits_row_errors *joint = &ctx->model->row_errors;
+    const int together = eits_may_fit_jointly(ctx);
+    const uint32_t rows = together ? joint->move_rows : u->move_rows;
+    const float *moves = together ? joint->moves[eits_weighs_errors(ctx)] : u->moves;
+    const eits_real *seen = together ? sums->joint : sums->move;
     for (uint32_t axis = 0; axis < 2; ++axis) {
         for (uint32_t t = 0; t < u->move_terms; ++t) {
-            const float *row = u->moves + (size_t)u->move_rows * (axis * u->move_terms + t);
+            const float *row = moves + (size_t)rows * (axis * u->move_terms + t);
             eits_real shift = 0;
-            for (uint32_t j = 0; j < u->move_rows; ++j)
-                shift = eits_fma((eits_real)row[j], sums->move[j], shift);
+            for (uint32_t j = 0; j < rows; ++j)
+                shift = eits_fma((eits_real)row[j], seen[j], shift);
             /* the gains' logarithms are -y, so this shift is the correction */
             b->shift_mm[axis][t] = b->place_trust * shift;
         }

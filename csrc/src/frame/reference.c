@@ -74,7 +74,7 @@ static void measure_distance(eits_context *ctx)
     const eits_model *model = ctx->model;
     eits_reference *b = &ctx->reference;
     eits_real logs = 0, apart = 0;
-    eits_place_sums sums = {{0}, {0}, {0}};
+    eits_place_sums sums = {{0}, {0}, {0}, {0}};
     uint32_t count = 0, pairs = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const eits_fold fold = model->fold[k];

@@ -43,6 +43,7 @@ void eits_take_second_frame(eits_context *ctx);
 /* -N'y, -M'y and minus the rest of y (model.h, eits_uncertainty). */
 typedef struct eits_place_sums {
     eits_real place[EITS_MAX_PLACE_ROWS], move[EITS_MAX_PLACE_ROWS], rest[EITS_MAX_PLACE_ROWS];
+    eits_real joint[EITS_MAX_PLACE_ROWS]; /* move's for touches that are fitted jointly */
 } eits_place_sums;
 
 /* Add to these sums the share of the logarithm of fold k's gain. */

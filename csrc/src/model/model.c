@@ -18,7 +18,7 @@ enum {
 
 typedef struct sections {
     eits_section dims, prot, fold, vref, redu, sens, scal, colw, grid, defs, gold, meta, flds,
-        force, whit, unce, geom, move, prec, plac, ordr, sums;
+        force, whit, unce, geom, move, rowe, prec, plac, ordr, sums;
 } sections;
 
 /* memcpy is used since a cast would read through a pointer of another type, and entries of the
@@ -107,12 +107,13 @@ static eits_status check_header(const uint8_t *bytes, size_t size)
 static eits_section *find_slot(sections *found, const uint8_t *tag)
 {
     static const char tags[] =
-        "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDSLOADWHITUNCEGEOMMOVEPRECPLACORDRSUMS";
+        "DIMSPROTFOLDVREFREDUSENSSCALCOLWGRIDDEFSGOLDMETAFLDSLOADWHITUNCEGEOMMOVEROWEPREC"
+        "PLACORDRSUMS";
     eits_section *slots[] = {&found->dims, &found->prot, &found->fold, &found->vref,  &found->redu,
                              &found->sens, &found->scal, &found->colw, &found->grid,  &found->defs,
                              &found->gold, &found->meta, &found->flds, &found->force, &found->whit,
-                             &found->unce, &found->geom, &found->move, &found->prec,  &found->plac,
-                             &found->ordr, &found->sums};
+                             &found->unce, &found->geom, &found->move, &found->rowe,  &found->prec,
+                             &found->plac, &found->ordr, &found->sums};
     for (size_t i = 0; i < sizeof slots / sizeof slots[0]; ++i) {
         if (memcmp(tags + 4 * i, tag, 4) == 0)
             return slots[i];
@@ -400,6 +401,8 @@ eits_status eits_model_open(eits_model *model, const void *blob, size_t size)
         status = eits_read_places(&opened, &found.geom);
     if (status == EITS_OK)
         status = eits_read_moves(&opened, &found.move);
+    if (status == EITS_OK)
+        status = eits_read_row_errors(&opened, &found.rowe);
     if (status == EITS_OK)
         status = eits_read_precision(&opened, &found.prec);
     if (status == EITS_OK)

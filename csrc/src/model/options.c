@@ -74,6 +74,12 @@ static int is_solver(eits_solver solver)
     return 0;
 }
 
+/* The bits have a gap, too: models use 8 and 16 for other things (touch_fit_left_out). */
+static int is_touch_fit(uint32_t bits)
+{
+    return (bits & ~EITS_TOUCH_FIT_ALL) == 0;
+}
+
 /* Check that options are in range. The ranges are wide: they keep numbers finite and counts in
  * range, and do not say which values are sensible. */
 int eits_options_in_range(const eits_options *o)
@@ -84,6 +90,7 @@ int eits_options_in_range(const eits_options *o)
     }
     /* A fit starts from the seed radius and stays between the other two: a seed outside them would
      * jump. */
-    return is_solver(o->solver) && o->touch_min_radius_mm <= o->touch_seed_radius_mm &&
+    return is_solver(o->solver) && is_touch_fit(o->touch_fit) &&
+           o->touch_min_radius_mm <= o->touch_seed_radius_mm &&
            o->touch_seed_radius_mm <= o->touch_max_radius_mm;
 }

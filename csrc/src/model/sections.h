@@ -57,6 +57,11 @@ eits_status eits_read_places(eits_model *model, const eits_section *found);
  * without GEOM). */
 eits_status eits_read_moves(eits_model *model, const eits_section *found);
 
+/* Read section ROWE, if there is one, into model->row_errors; MOVE and model->n_folded are known.
+ * Errors: EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers out of range, or a model
+ * without MOVE). */
+eits_status eits_read_row_errors(eits_model *model, const eits_section *found);
+
 /* Read section PREC, if there is one, into model->precision; row_form is known. Errors:
  * EITS_E_MODEL_SECTION (wrong size), EITS_E_MODEL_VALUE (numbers that are not finite, a variance
  * below 0, or a model that also has section WHIT). */

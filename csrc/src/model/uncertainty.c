@@ -101,6 +101,36 @@ eits_status eits_read_moves(eits_model *model, const eits_section *section)
     return EITS_OK;
 }
 
+/* Read section ROWE: the counts of vectors, of rows and of terms, and a distance; then vectors and
+ * rows for each fold, and `rows` numbers per metric, axis and term. */
+eits_status eits_read_row_errors(eits_model *model, const eits_section *section)
+{
+    uint32_t head[3];
+    if (section->data == NULL)
+        return EITS_OK;
+    if (section->size < HEAD)
+        return EITS_E_MODEL_SECTION;
+    memcpy(head, section->data, sizeof head);
+    const uint32_t count = head[0], rows = head[1], terms = head[2], folds = model->n_folded;
+    const float distance = eits_read_f32(section->data + sizeof head);
+    const float *values = (const float *)(const void *)(section->data + HEAD);
+    if (count == 0 || count > EITS_MAX_PLACE_ROWS || rows == 0 || rows > EITS_MAX_PLACE_ROWS ||
+        terms == 0 || terms != model->uncertainty.move_terms ||
+        section->size != HEAD + 4u * (folds * (count + rows) + 4u * terms * rows))
+        return EITS_E_MODEL_SECTION;
+    if (!are_places(values, folds * (count + rows) + 4u * terms * rows) ||
+        !eits_between(distance, 1e-6f, 1e6f))
+        return EITS_E_MODEL_VALUE;
+    const float *moved = values + (size_t)count * folds, *moves = moved + (size_t)rows * folds;
+    model->row_errors = (eits_row_errors){.vectors = values,
+                                          .count = count,
+                                          .distance = distance,
+                                          .moved = moved,
+                                          .moves = {moves, moves + 2u * (size_t)terms * rows},
+                                          .move_rows = rows};
+    return EITS_OK;
+}
+
 eits_status eits_read_uncertainty(eits_model *model, const eits_section *section)
 {
     const size_t numbers = (size_t)model->rank * (model->rank + 1u) / 2u;

@@ -19,6 +19,9 @@ typedef struct eits_fit {
     eits_real explained[EITS_MAX_TOUCHES];
     /* the test of touches (evidence/touch_test.c): 1 where it was made */
     uint32_t tested;
+    uint32_t changed; /* 1: the test has changed the discs */
+    uint32_t joint;   /* 1: discs are as the joint fit has them, with sharp edges */
+    uint32_t drifts;  /* 1: the data are likelier of a sheet that has drifted since its reference */
     /* minus twice the logarithm of the ratio of likelihoods without and with the disc, over the
      * data's own misfit where that is more than noise */
     eits_real rise[EITS_MAX_TOUCHES];

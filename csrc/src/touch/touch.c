@@ -148,6 +148,13 @@ void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *
 
 /* ---- the report ---- */
 
+/* mm^2: of the pixels that the fit covered, or of the joint fit's disc. */
+static eits_real area_of(const eits_context *ctx, const eits_fit *f, const eits_disc *disc)
+{
+    const eits_real pi = R(3.14159265358979323846);
+    return f->joint ? pi * disc->radius_mm * disc->radius_mm : eits_disc_area(ctx, disc);
+}
+
 /* Returns how many there are: those whose numbers are finite. */
 uint32_t eits_report_touches(const eits_context *ctx, const eits_fit *f, eits_touch *out)
 {
@@ -160,7 +167,7 @@ uint32_t eits_report_touches(const eits_context *ctx, const eits_fit *f, eits_to
             .x_mm = is_long ? ellipse[0] : disc->x_mm,
             .y_mm = is_long ? ellipse[1] : disc->y_mm,
             .radius_mm = is_long ? ellipse[2] : disc->radius_mm,
-            .strength_s_per_m_mm2 = disc->change * eits_disc_area(ctx, disc),
+            .strength_s_per_m_mm2 = disc->change * area_of(ctx, f, disc),
             .explained = f->explained[k] < 1 ? f->explained[k] : 1,
             .confidence = f->tested ? f->confidence[k] : 0,
             .x_variance_mm2 = f->place_mm2[k][0],

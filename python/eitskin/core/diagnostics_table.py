@@ -49,8 +49,8 @@ class InfoFields:
     # fraction of |d| above noise that lies outside the model's range, 0 to 1; 0 if it was not
     # examined
     model_mismatch: float = 0.0
-    # fraction of |y|^2 that the touches do not explain, set by eits_find_touches; 0 if no touches
-    # were looked for
+    # fraction of |y|^2 that the touches do not explain, or of |d|^2 where they were fitted jointly;
+    # set by eits_find_touches; 0 if no touches were looked for
     unexplained: float = 0.0
     # bit e: electrode e, of the first 64; eits_get_electrode_states has all
     open_electrodes: tuple[int, ...] = ()

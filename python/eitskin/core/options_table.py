@@ -12,7 +12,8 @@ SOLVERS = ("fista", "working-set", "active-set")
 LOG_DATA = 1
 SPLIT_MERGE = 2
 INTERACTION = 4
-ALL_TOUCH_FIT = 7
+JOINT = 32
+ALL_TOUCH_FIT = 39
 MAX_TOUCHES = 16
 MAX_TRACK_FRAMES = 1000
 
@@ -128,7 +129,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "follow_mm": (0, 1e30),
     "mac_limit": (0, 2**32 - 1),
     "diagnostics": (0, 511),
-    "touch_fit": (0, 7),
+    "touch_fit": (0, 39),
     "track_confirm": (0, MAX_TRACK_FRAMES),
     "track_hold": (0, MAX_TRACK_FRAMES),
     "track_smooth": (0, 1e30),

@@ -13,7 +13,16 @@ from eitskin.arrays import AnyArray, BoolArray, FloatArray
 from eitskin.core.diagnostics import names, words
 from eitskin.core.diagnostics_table import InfoFields, Touch
 from eitskin.core.notebook import places_text, touches_html
-from eitskin.core.options_table import CHOICES, RANGES, OptionFields
+from eitskin.core.options_table import (
+    ALL_TOUCH_FIT,
+    CHOICES,
+    INTERACTION,
+    JOINT,
+    LOG_DATA,
+    RANGES,
+    SPLIT_MERGE,
+    OptionFields,
+)
 from eitskin.errors import FrameError, UsageError
 
 
@@ -41,6 +50,12 @@ def check_options(o: Options) -> None:
             raise UsageError(f"options: {name} = {value!r} is not known; use one of {known}")
         elif kind is bool and value not in (False, True):
             raise UsageError(f"options: {name} = {value!r} must be true or false")
+    if o.touch_fit & ~ALL_TOUCH_FIT:
+        raise UsageError(
+            f"options: touch_fit = {o.touch_fit} is out of range: it has bits without a meaning;"
+            f" use a sum of LOG_DATA {LOG_DATA}, SPLIT_MERGE {SPLIT_MERGE}, INTERACTION"
+            f" {INTERACTION} and JOINT {JOINT}"
+        )
     if not o.touch_min_radius_mm <= o.touch_seed_radius_mm <= o.touch_max_radius_mm:
         raise UsageError(
             f"options: touch radii of {o.touch_min_radius_mm:g}, {o.touch_seed_radius_mm:g} and "

@@ -41,6 +41,7 @@ TOUCH_CHANGE_RATIO = 1.35
 # expected change has to fix it instead.
 LOG_RADIUS_WEIGHT = 1.0
 # Elements of the mesh for model errors; with 3000, the errors of shaped touches are 15 % too small.
+FIELD_ELEMENTS = 12000  # of the mesh of the stored fields, which touches are fitted by
 ERROR_ELEMENTS = 6000
 
 
@@ -100,7 +101,8 @@ def linearise(
     mesh = mesh_for_elements(skin, elements)
     forward = ForwardModel(mesh, skin, protocol)
     jacobian, v0 = sensitivity(forward, skin.conductivity_s_per_m, grid)
-    fields = electrode_fields(forward, skin.conductivity_s_per_m, grid)
+    fine = ForwardModel(mesh_for_elements(skin, max(elements, FIELD_ELEMENTS)), skin, protocol)
+    fields = electrode_fields(fine, skin.conductivity_s_per_m, grid)
     return Linearisation(grid, jacobian, v0, mesh.n_elements, fields)
 
 
@@ -257,6 +259,7 @@ def with_model_errors(
         projection=model.projection.astype(np.float64),
         grid=model.grid,
         uncertainty=uncertainty,
+        fits_jointly=model.fields is not None,
     )
     return replace(model, model_errors=draw_model_errors(request, progress=progress))
 

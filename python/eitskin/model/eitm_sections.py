@@ -24,7 +24,12 @@ from eitskin.model.model import (
     Golden,
     Model,
 )
-from eitskin.model.model_errors import ModelErrors, decode_model_errors, decode_places
+from eitskin.model.model_errors import (
+    ModelErrors,
+    decode_model_errors,
+    decode_places,
+    decode_row_errors,
+)
 from eitskin.model.row_form import decode_row_form
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
@@ -96,6 +101,8 @@ def encode_sections(model: Model) -> Sections:
         sections["UNCE"] = model.model_errors.encode()
         if model.model_errors.places is not None:
             sections |= model.model_errors.places.encode()
+            if model.model_errors.rows is not None:
+                sections["ROWE"] = model.model_errors.rows.encode()
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
     if model.fields is not None:
@@ -406,7 +413,12 @@ def _read_model_errors(sections: Sections, d: _Dims, where: str) -> ModelErrors:
     more."""
     both = "GEOM" in sections and "MOVE" in sections
     places = decode_places(sections["GEOM"], sections["MOVE"], d.n_folded, where) if both else None
-    return decode_model_errors(sections["UNCE"], d.rank, where, places)
+    rows = (
+        decode_row_errors(sections["ROWE"], d.n_folded, places, where)
+        if "ROWE" in sections
+        else None
+    )
+    return decode_model_errors(sections["UNCE"], d.rank, where, places, rows)
 
 
 def _short(value: float) -> float:

@@ -1,5 +1,5 @@
-"""Bounds for the differences between the data of a real skin and the model: the sections UNCE, GEOM
-and MOVE of a .eitm file."""
+"""Bounds for the differences between the data of a real skin and the model: the sections UNCE,
+GEOM, MOVE and ROWE of a .eitm file."""
 
 import struct
 from dataclasses import dataclass
@@ -14,7 +14,9 @@ Float32s = npt.NDArray[np.float32]
 
 HEAD = struct.Struct("<I3f")
 MOVE_HEAD = struct.Struct("<III4x")
+ROWE_HEAD = struct.Struct("<IIIf")
 MAX_ROWS, MAX_MM = 32, 1e6
+MIN_DISTANCE = 1e-6
 MOVE_TERMS = (1, 3, 6, 10, 15)  # terms of a polynomial in two coordinates, of degree 0 to 4
 ROW_GAINS = 1
 HUGE = 1e30
@@ -48,6 +50,63 @@ class TarePlaces:
 
 
 @dataclass(frozen=True, eq=False)
+class RowErrors:
+    """What the joint fit of touches, which works on the k folded rows, knows of skins that differ
+    from the model.
+
+    ``vectors`` e (n, k) give the errors' second moment sum e e', relative to |d|^2, in skins whose
+    y = log(v0 / v_ref) has the rms ``distance``. ``seen`` (q, k) and ``moves`` (2, 2, t, q) are as
+    in :class:`TarePlaces`, ``moves`` for white noise first, then for the metric with errors.
+    """
+
+    vectors: Float32s
+    distance: float
+    seen: Float32s
+    moves: Float32s
+
+    def encode(self) -> bytes:
+        """Return the bytes of section ROWE, with rows ordered by fold."""
+        head = ROWE_HEAD.pack(len(self.vectors), len(self.seen), self.moves.shape[2], self.distance)
+        return head + b"".join(
+            np.ascontiguousarray(part).astype("<f4").tobytes()
+            for part in (self.vectors.T, self.seen.T, self.moves)
+        )
+
+
+def decode_row_errors(
+    content: bytes, folds: int, places: TarePlaces | None, where: str
+) -> RowErrors:
+    """Return the content of section ROWE for a model with ``folds`` folded rows and ``places``.
+
+    Raises:
+        ModelError: the model has no ``places``, a length does not fit the counts, or a number is
+            out of range.
+    """
+    headed = len(content) >= ROWE_HEAD.size
+    count, rows, terms, distance = ROWE_HEAD.unpack_from(content) if headed else (0, 0, 0, 0.0)
+    if (
+        not 1 <= count <= MAX_ROWS
+        or not 1 <= rows <= MAX_ROWS
+        or places is None
+        or terms != places.moves.shape[1]
+        or len(content) != ROWE_HEAD.size + 4 * (folds * (count + rows) + 4 * terms * rows)
+    ):
+        raise ModelError(_other_size(where, "ROWE"))
+    numbers = np.frombuffer(content, dtype="<f4", offset=ROWE_HEAD.size)
+    if not (np.abs(numbers) <= MAX_MM).all() or not MIN_DISTANCE <= distance <= MAX_MM:
+        raise ModelError(
+            f"{where}: holds a number in section 'ROWE' that is out of range; build the model again"
+        )
+    vectors, seen, moves = np.split(numbers, np.cumsum([folds * count, folds * rows]))
+    return RowErrors(
+        np.ascontiguousarray(vectors.reshape(folds, count).T),
+        float(distance),
+        np.ascontiguousarray(seen.reshape(folds, rows).T),
+        moves.reshape(2, 2, terms, rows),
+    )
+
+
+@dataclass(frozen=True, eq=False)
 class ModelErrors:
     """Second moments of the data's errors, reduced by P.
 
@@ -56,7 +115,8 @@ class ModelErrors:
     Both are float32, symmetric and positive semidefinite. ``rms_error`` and ``rms_shape_error`` are
     sqrt(mean |e|^2) for random skins and for shaped touches over all rows. ``row_gains`` tells that
     each row is to be scaled to the model by the tare. ``places`` states what the tare reveals about
-    places; None means unknown.
+    places; None means unknown. ``rows`` is what the joint fit of touches needs; None where the
+    model has no fields for it.
     """
 
     error: Float32s
@@ -65,6 +125,7 @@ class ModelErrors:
     rms_shape_error: float
     row_gains: bool = True
     places: TarePlaces | None = None
+    rows: RowErrors | None = None
 
     def encode(self) -> bytes:
         """Return the bytes of section UNCE."""
@@ -82,9 +143,10 @@ def decode_model_errors(
     rank: int,
     where: str,
     places: TarePlaces | None = None,
+    rows: RowErrors | None = None,
 ) -> ModelErrors:
     """Return the model errors in section UNCE for a model of ``rank``; ``places`` are those of the
-    sections GEOM and MOVE.
+    sections GEOM and MOVE, ``rows`` those of ROWE.
 
     Raises:
         ModelError: the length does not fit the rank, a number is out of range, or a matrix is not
@@ -118,6 +180,7 @@ def decode_model_errors(
         float(str(np.float32(rms_shape_error))),
         bool(flags & ROW_GAINS),
         places,
+        rows,
     )
 
 

@@ -23,13 +23,14 @@ from eitskin.arrays import FloatArray
 from eitskin.errors import ModelError
 from eitskin.model.model_errors import ModelErrors
 from eitskin.model.random_skins import RandomSkins, Request
-from eitskin.model.tare_places import tare_places
+from eitskin.model.tare_places import metrics_of, row_errors, tare_places
 from eitskin.progress import Progress, silent
 
 METHODS: dict[str, Callable[..., Any]] = {
     "sample": RandomSkins.sample,
     "error": RandomSkins.error,
     "drift": RandomSkins.drift,
+    "row_errors": RandomSkins.row_errors,
     "places": tare_places,
 }
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -62,19 +63,23 @@ def draw_model_errors(
             for _ in range(count):
                 processes.append(_Process(request))
                 idle.put(processes[-1])
-            drift, tared = (pool.submit(ask, name) for name in ("drift", "places"))
+            drift = pool.submit(ask, "drift")
             drawn: Iterable[FloatArray] = pool.map(
                 lambda number: ask("sample", number), range(samples)
             )
             rows = np.array(list(progress(drawn, samples)))
             rms_error, rms_shape_error = np.sqrt(np.mean(rows[:, -2:] ** 2, axis=0))
+            vectors, distance = ask("row_errors", rows)
+            metrics = metrics_of(vectors) if request.fits_jointly else []
+            places = ask("places", metrics)
             return ModelErrors(
                 error=ask("error", rows),
                 drift=drift.result(),
                 rms_error=float(np.float32(rms_error)),
                 rms_shape_error=float(np.float32(rms_shape_error)),
                 row_gains=request.uncertainty.row_gains,
-                places=tared.result(),
+                places=places.reduced,
+                rows=row_errors(vectors, distance, places) if request.fits_jointly else None,
             )
         finally:
             pool.shutdown(wait=False, cancel_futures=True)

@@ -21,7 +21,7 @@ from eitskin.fem.grid import Grid
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.sensitivity import element_fields
 from eitskin.fem.shaped_touch import ShapedTouch, TouchCover
-from eitskin.model.model_errors import Float32s, as_covariance
+from eitskin.model.model_errors import MIN_DISTANCE, Float32s, as_covariance
 from eitskin.model.reduction import fold_rows
 from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.skin.skin import Skin
@@ -35,6 +35,7 @@ TRIES = 200
 STEP = 0.1  # of finite differences, as a part of the disc's radius
 FIELD_LENGTHS = 8
 NUMBERS_AT_ONCE = 2**21
+ROW_ERRORS = 24  # strongest vectors of the errors in row space; the others are below the noise
 CELL = 0.15  # side of a cell, as a part of the least correlation length of a field
 
 
@@ -51,6 +52,7 @@ class Request:
     projection: FloatArray
     grid: Grid
     uncertainty: Uncertainty
+    fits_jointly: bool = False  # whether the model has what the joint fit of touches needs
 
 
 def sensitivity_of(
@@ -92,8 +94,10 @@ class RandomSkins:
         self.v_ref = self._fold(self.forward.voltages_of(solution))
 
     def sample(self, number: int) -> FloatArray:
-        """Return sample ``number``: P e_all (r), P e_shape (r), |e_all|, |e_shape|. It does not
-        depend on which other samples are drawn."""
+        """Return sample ``number``: P e_all (r) and P e_shape (r); e_all (k) and e_shape (k) with
+        the part that discs explain; the rms of y = log(v0 / v_ref), which tells how far the skin is
+        from the model; |e_all| and |e_shape|. It does not depend on which other samples are
+        drawn."""
         request, asked = self.request, self.request.uncertainty
         draw = np.random.default_rng(np.random.SeedSequence(asked.seed, spawn_key=(number,)))
         mesh, conductivity, impedance = self._random_skin(draw)
@@ -106,21 +110,45 @@ class RandomSkins:
         nominal, shaped = (self._nominal(given) for given in (discs, touches))
         size = np.linalg.norm(nominal)
         errors = np.column_stack([true - nominal, shaped - nominal]) / size
+        whole = errors.T.ravel()
         explained = np.linalg.qr(np.column_stack([self._columns(disc) for disc in discs]))[0]
         for _ in range(2):
             errors -= explained @ (explained.T @ errors)
         reduced = request.projection @ errors
-        return np.concatenate([reduced.T.ravel(), np.linalg.norm(errors, axis=0)])
+        distance = np.sqrt(np.mean(self._log_ratio(v0) ** 2))
+        return np.concatenate(
+            [reduced.T.ravel(), whole, [distance], np.linalg.norm(errors, axis=0)]
+        )
 
     def error(self, rows: FloatArray) -> Float32s:
-        """Return P E P' (r, r) from samples (s, 2 r + 2): the second moment of e_all, plus that of
-        e_shape times its weight."""
+        """Return P E P' (r, r) from samples (s, 2 r + 2 k + 3): the second moment of e_all, plus
+        that of e_shape times its weight."""
         rank = len(self.request.projection)
         all_, shape = (
             np.einsum("si,sj->ij", part, part) / len(rows)
             for part in (rows[:, :rank], rows[:, rank : 2 * rank])
         )
         return as_covariance(all_ + self.request.uncertainty.touch_shapes * shape)
+
+    def row_errors(self, rows: FloatArray) -> tuple[FloatArray, float]:
+        """Return E = sum of e e' by its strongest vectors e (n, k), and the rms of y, from samples:
+        the second moments of e_all and, by its weight, of e_shape, with the part that discs
+        explain."""
+        begin = 2 * len(self.request.projection)
+        folds = self.request.projection.shape[1]
+        all_, shape = (
+            np.einsum("si,sj->ij", part, part) / len(rows)
+            for part in (
+                rows[:, begin : begin + folds],
+                rows[:, begin + folds : begin + 2 * folds],
+            )
+        )
+        values, vectors = np.linalg.eigh(all_ + self.request.uncertainty.touch_shapes * shape)
+        # a skin that is as described has none, and no distance; a file has to state some
+        count = min(ROW_ERRORS, max(1, int(np.count_nonzero(values > 0))))
+        kept = np.asarray(np.argsort(-values)[:count])
+        strongest = (vectors[:, kept] * np.sqrt(np.maximum(values[kept], 0.0))).T
+        return strongest, max(float(np.sqrt(np.mean(rows[:, -3] ** 2))), MIN_DISTANCE)
 
     def drift(self) -> Float32s:
         """Return P D P' (r, r), where D is the covariance, to first order, of the data that a
@@ -179,6 +207,14 @@ class RandomSkins:
                 weak, 0.0, gain * v0 * np.log(np.clip(v / safe, 1 / MAX_RATIO, MAX_RATIO))
             )
         return np.asarray(gain * (v - v0))
+
+    def _log_ratio(self, v0: FloatArray) -> FloatArray:
+        """Return y = log(gain v0 / v_ref) (k,), 0 where a row has next to no reference."""
+        v_ref = self.v_ref
+        gain = float(np.linalg.norm(v_ref) / np.linalg.norm(v0))
+        defined = (np.abs(v_ref) >= RATIO_DEFINED * np.sqrt(np.mean(v_ref**2))) & (v_ref * v0 > 0)
+        ratio = np.where(defined, gain * v0 / np.where(defined, v_ref, 1.0), 1.0)
+        return np.asarray(np.log(np.clip(ratio, 1 / MAX_ROW_GAIN, MAX_ROW_GAIN)))
 
     def _sensitivity(self, elements: IntArray) -> FloatArray:
         return sensitivity_of(self.request, self.forward, self._pairs, self.v_ref, elements)

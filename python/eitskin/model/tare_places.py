@@ -23,6 +23,7 @@ information. The directions with the least variance, which no such skin produces
 single rows.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,7 @@ from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.sensitivity import element_fields
 from eitskin.fem.shaped_touch import ShapedTouch, TouchCover
-from eitskin.model.model_errors import TarePlaces
+from eitskin.model.model_errors import RowErrors, TarePlaces
 from eitskin.model.random_skins import (
     FIELD_LENGTHS,
     HARMONICS,
@@ -61,13 +62,28 @@ STEP = 0.01  # in R: finite difference of a shift or wave
 FIELD_PLACES = 500  # at most so many elements serve to separate the fields
 FIELD_STEP = 0.1  # finite difference of the log conductivity
 EDGE_STEP = 0.1  # finite difference of a touch's place, as a part of its radius
+SIGNAL_TO_NOISE = 400.0  # |d| over a row's noise at which the metric with errors is taken
+ERROR_SHARE = 0.25  # and the share of the errors in it; a factor of 4 either way changes little
 LEAST_SHARE = 0.05  # r is taken as at least this
 
 
-def tare_places(skins: RandomSkins) -> TarePlaces:
-    """Return what the tare reveals about places on ``skins``."""
-    causes = _Causes(skins)
-    variance, logs, moves = causes.all()
+@dataclass(frozen=True, eq=False)
+class PlacesByMetric:
+    """What the tare reveals about places: for touches that are found in reduced data
+    (``reduced``), and for touches that are found in folded rows by each of m metrics: ``seen``
+    (q, k) and ``moves`` (m, 2, t, q) as in :class:`TarePlaces`."""
+
+    reduced: TarePlaces
+    seen: FloatArray
+    moves: FloatArray
+
+
+def tare_places(skins: RandomSkins, metrics: Sequence[FloatArray] = ()) -> PlacesByMetric:
+    """Return what the tare reveals about places on ``skins``. Each of ``metrics`` (k, k) is a
+    matrix W for which touches are found by the least |W (data - answers)|^2."""
+    causes = _Causes(skins, metrics)
+    variance, logs, by_metric = causes.all()
+    moves = by_metric[:, 0]
     electrodes = slice(causes.electrodes)
     covariance = (logs.T * variance) @ logs + ROUGH**2 * np.eye(logs.shape[1])
     found = (variance[:, None] * logs) @ np.linalg.inv(covariance)
@@ -86,15 +102,55 @@ def tare_places(skins: RandomSkins) -> TarePlaces:
     inverse = (vectors / np.sqrt(values)) @ vectors.T
     strength, of_left = _strongest(rows @ root)
     terms = causes.terms()
-    polynomials = np.linalg.lstsq(terms, moves.transpose(1, 2, 0).reshape(len(terms), -1), None)[0]
-    shift = polynomials.reshape(terms.shape[1], 2, -1).transpose(1, 0, 2) @ found @ root
+
+    def shift_of(moves: FloatArray) -> FloatArray:
+        """Return U M of one metric, (2, t, k), times the square root of the covariance of y."""
+        values = moves.transpose(1, 2, 0).reshape(len(terms), -1)
+        polynomials = np.linalg.lstsq(terms, values, None)[0]
+        by_axis = polynomials.reshape(terms.shape[1], 2, -1).transpose(1, 0, 2)
+        return np.asarray(by_axis @ found @ root)
+
+    shift = shift_of(moves)
     _, of_moves = _strongest((terms @ shift).reshape(-1, len(root)))
-    return TarePlaces(
-        np.asarray(strength[:, None] * of_left @ inverse, dtype=np.float32),
-        np.asarray(of_moves @ inverse, dtype=np.float32),
-        np.asarray(shift @ of_moves.T, dtype=np.float32),
-        np.asarray(_outside((logs.T * variance) @ logs), dtype=np.float32),
+    shifts = np.array([shift_of(by_metric[:, 1 + m]) for m in range(len(metrics))])
+    shifts = shifts.reshape(len(metrics), *shift.shape)
+    _, of_shifts = _strongest((terms @ shifts).reshape(-1, len(root)))
+    return PlacesByMetric(
+        TarePlaces(
+            np.asarray(strength[:, None] * of_left @ inverse, dtype=np.float32),
+            np.asarray(of_moves @ inverse, dtype=np.float32),
+            np.asarray(shift @ of_moves.T, dtype=np.float32),
+            np.asarray(_outside((logs.T * variance) @ logs), dtype=np.float32),
+        ),
+        of_shifts @ inverse,
+        shifts @ of_shifts.T,
     )
+
+
+def metrics_of(errors: FloatArray) -> list[FloatArray]:
+    """Return the metrics (k, k) for which the joint fit of touches has corrections of places:
+    white noise, and white noise with the model's ``errors`` (n, k) of a skin that is far from the
+    model."""
+    folds = errors.shape[1]
+    covariance = np.eye(folds) / SIGNAL_TO_NOISE**2 + ERROR_SHARE * errors.T @ errors
+    values, vectors = np.linalg.eigh(covariance)
+    return [np.eye(folds), np.asarray((vectors / np.sqrt(values)).T)]
+
+
+def row_errors(errors: FloatArray, distance: float, places: PlacesByMetric) -> RowErrors:
+    """Return what a model stores for the joint fit of touches."""
+    vectors, seen, moves = (
+        np.asarray(part, dtype=np.float32) for part in (errors, places.seen, places.moves)
+    )
+    return RowErrors(vectors, float(np.float32(distance)), seen, moves)
+
+
+def _displacement_of(metric: FloatArray, parts: Sequence[FloatArray]) -> FloatArray:
+    """Return for each of p touches the map (2, k) from data to its displacement, (p, 2, k).
+    ``parts`` (k, p) are the answer of each touch and its slopes by x and y; the map is of least
+    squares in ``metric`` (r, k)."""
+    touches = zip(*((metric @ part).T for part in parts), strict=True)
+    return np.array([np.linalg.pinv(np.column_stack(touch))[1:] @ metric for touch in touches])
 
 
 def _outside(covariance: FloatArray) -> FloatArray:
@@ -118,6 +174,7 @@ class _Causes:
     """The effects of each cause: on y, and on the places where touches are found."""
 
     skins: RandomSkins
+    metrics: Sequence[FloatArray] = ()
     waves: int = 2 * len(HARMONICS)
 
     def __post_init__(self) -> None:
@@ -142,17 +199,17 @@ class _Causes:
         slopes = ((right - left) / (2 * h), (up - down) / (2 * h))
         _, columns = self._columns(skins.forward, skins.conductivity)
         self._columns_here = columns
-        reduced = [
-            skins.request.projection @ columns @ weights for weights in (self._weights, *slopes)
+        # for each metric (p, 2, k): the map from the data of a touch to its displacement
+        self._displacement_of = [
+            _displacement_of(metric, [columns @ weights for weights in (self._weights, *slopes)])
+            for metric in (skins.request.projection, *self.metrics)
         ]
-        # (p, 2, r): the map from the reduced data of a touch to its displacement
-        self._displacement_of = np.array([np.linalg.pinv(np.column_stack(d))[1:] for d in zip(
-            *(part.T for part in reduced), strict=True)])  # fmt: skip
         self._found = self._moved(columns, self._weights)
 
     def all(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return for c causes their variances (c,), the change of y by each (c, k), and the change
-        of the places that are found (c, p, 2) in mm."""
+        of the places that are found by each metric, the reduced data's first (c, 1 + m, p, 2), in
+        mm."""
         skins = self.skins
         asked, radius = skins.request.uncertainty, skins.radius_mm
         count, rim = self.electrodes, skins.deformation.rim
@@ -210,8 +267,8 @@ class _Causes:
         return np.asarray(np.where(weak, 0.0, relative - v_ref**2 @ relative / (v_ref @ v_ref)))
 
     def _at(self, forward: ForwardModel, conductivity: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return y (k,) of a skin, and how far from ``places`` touches are found in it (p, 2),
-        mm."""
+        """Return y (k,) of a skin, and how far from ``places`` touches are found in it by each
+        metric (1 + m, p, 2), mm."""
         skins = self.skins
         same = forward.mesh is skins.request.mesh
         weights = self._weights if same else self._covered(forward.mesh, (0.0, 0.0))
@@ -219,10 +276,10 @@ class _Causes:
         return logs, self._moved(columns, weights)
 
     def _moved(self, columns: FloatArray, weights: csc_matrix) -> FloatArray:
-        """Return where touches are found, (p, 2) in mm from ``places``, up to a part that all skins
-        share."""
-        answers = self.skins.request.projection @ (columns @ weights)
-        return np.asarray(np.einsum("pir,rp->pi", self._displacement_of, answers))
+        """Return where touches are found by each metric, (1 + m, p, 2) in mm from ``places``, up
+        to a part that all skins share."""
+        answers = columns @ weights
+        return np.array([np.einsum("pik,kp->pi", of, answers) for of in self._displacement_of])
 
     def _columns(
         self, forward: ForwardModel, conductivity: FloatArray

@@ -1,10 +1,10 @@
 """Places of touches, corrected by what the reference says of misplaced electrodes:
-docs/reference/eitm-format.md, "MOVE"."""
+docs/reference/eitm-format.md, "MOVE" and "ROWE"."""
 
 import numpy as np
 
 from eitskin.arrays import FloatArray
-from eitskin.core.constants_table import MAX_SHIFT, ROW_SPREAD
+from eitskin.core.constants_table import ERRORS_FROM, MAX_SHIFT, ROW_SPREAD
 from eitskin.model.model import Model
 
 
@@ -22,8 +22,13 @@ def corrected(model: Model, log_gain: FloatArray, place_mm: FloatArray) -> Float
     trust = 1 / (1 + float(rest @ rest) / scale) ** 2
     half = np.array([grid.nx, grid.ny]) * grid.pixel_mm / 2
     u, v = (place_mm - np.asarray(grid.origin_mm) - half) / half.max()
-    count = told.moves.shape[1]
+    seen, moves = told.seen, told.moves
+    rows = model.model_errors.rows
+    if rows is not None:  # touches are fitted jointly, in one of two metrics
+        distance = np.sqrt(np.nanmean(log_gain**2))
+        seen, moves = rows.seen, rows.moves[int(distance > ERRORS_FROM * rows.distance)]
+    count = moves.shape[1]
     terms = [u ** (n - j) * v**j for n in range(count) for j in range(n + 1)][:count]
-    off = told.moves.astype(float) @ (told.seen.astype(float) @ y) @ np.array(terms)
+    off = moves.astype(float) @ (seen.astype(float) @ y) @ np.array(terms)
     reach = MAX_SHIFT * grid.pixel_mm
     return np.asarray(place_mm - np.clip(trust * off, -reach, reach))

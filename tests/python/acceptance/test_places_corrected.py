@@ -24,8 +24,12 @@ def factory() -> WorldFactory:
 
 
 def uncorrected(model: Model) -> Model:
-    assert model.model_errors is not None
-    return replace(model, model_errors=replace(model.model_errors, places=None))
+    """The model with shifts of 0."""
+    errors = model.model_errors
+    assert errors is not None and errors.places is not None and errors.rows is not None
+    places = replace(errors.places, moves=np.zeros_like(errors.places.moves))
+    rows = replace(errors.rows, moves=np.zeros_like(errors.rows.moves))
+    return replace(model, model_errors=replace(errors, places=places, rows=rows))
 
 
 def found_mm(model: Model, engine: str, scenes: WorldScenes) -> list[np.ndarray]:

@@ -73,7 +73,7 @@ def test_json_by_numpy(json_of, frames_file):
         assert all(touch["confidence"] is None for touch in one["touches"])
         for touch, near in zip(one["touches"], other["touches"], strict=True):
             off = touch["x_mm"] - near["x_mm"], touch["y_mm"] - near["y_mm"]
-            assert abs(off[0]) < 1 and abs(off[1]) < 1
+            assert abs(off[0]) < 2 and abs(off[1]) < 2  # the oracle fits discs alone
 
 
 def test_what_is_found_is_said(done, frames_file, tmp_path, capsys):

@@ -20,6 +20,8 @@ MODULES = (
     "solve",
     "touch",
     "evidence",
+    "multipole",
+    "joint",
     "api",
 )
 # of no stage of a frame; the first two know nothing of contexts
@@ -39,6 +41,8 @@ OWNERS = {
     "solver": {"solve"},
     "touch": {"touch"},
     "evidence": {"evidence"},
+    "multipole": {"multipole"},
+    "joint": {"joint"},
     "tracker": {"touch"},
     "columns": {"context"},
     "options": set(),

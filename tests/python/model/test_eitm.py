@@ -61,7 +61,7 @@ def test_round_trip(storage, data_kind):
 def test_the_order_of_drives_is_kept_and_only_whole_ones_are_read():
     made = replace(prebuilt()[0], protocol=in_order(prebuilt()[0].protocol, "by 7"))
     blob = encode_model(made)
-    assert struct.unpack_from("<2H", blob, 4) == (1, 10)
+    assert struct.unpack_from("<2H", blob, 4) == (1, 11)
     again = decode_model(blob, "x")
     assert again.protocol.drive_order == made.protocol.drive_order
     assert encode_model(again) == blob

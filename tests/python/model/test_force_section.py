@@ -32,7 +32,7 @@ def test_without_it_nothing_changes():
 @pytest.mark.parametrize("order", range(5))
 def test_it_is_read_as_written(order):
     blob = encode_model(replace(prebuilt()[0], force_law=law(order)))
-    assert HEADER.unpack_from(blob)[1:3] == (1, 10)
+    assert HEADER.unpack_from(blob)[1:3] == (1, 11)
     read = decode_model(blob, "made").force_law
     assert read is not None and encode_force_law(read) == encode_force_law(law(order))
     CoreEngine(blob, "float32")  # opens

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from two_readers import agreed
 
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import ModelError
@@ -20,14 +21,15 @@ from eitskin.model.model import DATA_KINDS, Model
 from eitskin.model.model_errors import (
     HEAD,
     ModelErrors,
+    RowErrors,
     TarePlaces,
     as_covariance,
     decode_model_errors,
 )
 from eitskin.model.monte_carlo import draw_model_errors
-from eitskin.model.random_skins import RandomSkins, Request
+from eitskin.model.random_skins import ROW_ERRORS, RandomSkins, Request
 from eitskin.model.reduction import fold_rows
-from eitskin.model.tare_places import tare_places
+from eitskin.model.tare_places import metrics_of, row_errors, tare_places
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import disk, polygon
 from eitskin.skin.protocol import adjacent
@@ -168,13 +170,8 @@ def test_it_is_read_as_written():
 
 def test_what_the_tare_tells_of_places_is_read_as_written():
     model = decode_model(tiny_blob(), "tiny")
-    bare, draw, folds = (
-        replace(errors(), places=None),
-        np.random.default_rng(3),
-        len(model.fold.first),
-    )
-    shapes = ((3, folds), (2, folds), (2, 6, 2), (4, folds))
-    places = TarePlaces(*(draw.normal(size=shape).astype(np.float32) for shape in shapes))
+    bare, folds = replace(errors(), places=None), len(model.fold.first)
+    places = made_places(folds)
     blob = encode_model(replace(model, model_errors=replace(bare, places=places)))
     assert HEADER.unpack_from(blob)[1:3] == (1, 10)
     read = decode_model(blob, "made").model_errors
@@ -200,6 +197,131 @@ def test_what_the_tare_tells_of_places_is_read_as_written():
             decode_model(encode_model(replace(model, model_errors=wrong)), "made")
 
 
+def made_rows(folds: int, terms: int = 6) -> RowErrors:
+    draw = np.random.default_rng(8)
+    shapes = ((3, folds), (2, folds), (2, 2, terms, 2))
+    vectors, seen, moves = (draw.normal(size=shape).astype(np.float32) for shape in shapes)
+    return RowErrors(vectors, float(np.float32(0.18)), seen, moves)
+
+
+def made_places(folds: int) -> TarePlaces:
+    draw = np.random.default_rng(3)
+    shapes = ((3, folds), (2, folds), (2, 6, 2), (4, folds))
+    return TarePlaces(*(draw.normal(size=shape).astype(np.float32) for shape in shapes))
+
+
+def test_row_errors_are_read_as_written():
+    model = decode_model(tiny_blob(), "tiny")
+    folds = len(model.fold.first)
+    places, rows = made_places(folds), made_rows(folds)
+    with_rows = replace(errors(), places=places, rows=rows)
+    blob = encode_model(replace(model, model_errors=with_rows))
+    assert HEADER.unpack_from(blob)[1:3] == (1, 11)
+    read = decode_model(blob, "made").model_errors
+    assert read is not None and read.rows is not None
+    assert read.rows.encode() == rows.encode() and read.rows.distance == rows.distance
+    for part in ("vectors", "seen", "moves"):
+        assert (getattr(read.rows, part) == getattr(rows, part)).all()
+    assert encode_model(decode_model(blob, "made")) == blob
+    assert agreed(blob, "row errors")
+    # of no use, and refused, without the places that it corrects
+    alone = encode_model(replace(model, model_errors=replace(with_rows, places=None)))
+    assert HEADER.unpack_from(alone)[1:3] == (1, 4)
+
+
+def test_row_errors_that_do_not_fit_are_refused_by_both_readers():
+    model = decode_model(tiny_blob(), "tiny")
+    folds = len(model.fold.first)
+    places, rows = made_places(folds), made_rows(folds)
+    size, value = "section 'ROWE' of a size", "a number in section 'ROWE' that is out of range"
+    for change, said in (
+        ({"vectors": rows.vectors[:0]}, size),
+        ({"vectors": np.vstack([rows.vectors] * 11)}, size),
+        ({"vectors": rows.vectors[:, 1:]}, size),
+        ({"seen": rows.seen[:0]}, size),
+        ({"seen": np.vstack([rows.seen] * 17)}, size),
+        ({"moves": rows.moves[:, :, :3]}, size),
+        ({"moves": rows.moves[:1]}, size),
+        ({"vectors": rows.vectors * np.float32(3e6)}, value),
+        ({"seen": np.full_like(rows.seen, np.nan)}, value),
+        ({"moves": rows.moves + np.float32(np.inf)}, value),
+        ({"distance": 0.0}, value),
+        ({"distance": 5e-7}, value),
+        ({"distance": 2e6}, value),
+        ({"distance": float("nan")}, value),
+    ):
+        wrong = replace(errors(), places=places, rows=replace(rows, **change))
+        blob = encode_model(replace(model, model_errors=wrong))
+        with pytest.raises(ModelError, match=said) as refused:
+            decode_model(blob, "made")
+        assert "\n" not in str(refused.value)
+        assert not agreed(blob, change)
+    sections = encode_sections(replace(model, model_errors=replace(errors(), places=None)))
+    with pytest.raises(ModelError, match=size):
+        decode_sections(sections | {"ROWE": rows.encode()}, model.protocol.hash, "made")
+
+
+def test_row_errors_are_the_strongest_of_the_drawn_ones():
+    skins = RandomSkins(request())
+    rank, folds = request().projection.shape
+    rows = np.array([skins.sample(k) for k in range(8)])
+    assert rows.shape[1] == 2 * rank + 2 * folds + 3
+    drawn = rows[:, 2 * rank : 2 * rank + folds]
+    shaped = rows[:, 2 * rank + folds : 2 * rank + 2 * folds]
+    # discs explain a part, so the whole errors are larger than those that UNCE has
+    assert (np.linalg.norm(drawn, axis=1) >= rows[:, -2]).all()
+    vectors, distance = skins.row_errors(rows)
+    assert 0 < len(vectors) <= ROW_ERRORS and vectors.shape[1] == folds
+    moment = (drawn.T @ drawn + FEW.touch_shapes * shaped.T @ shaped) / len(rows)
+    assert np.linalg.norm(vectors.T @ vectors - moment) < 1e-6 * np.linalg.norm(moment)
+    sizes = np.linalg.norm(vectors, axis=1)
+    assert (np.diff(sizes) <= 0).all()
+    assert distance == pytest.approx(np.sqrt(np.mean(rows[:, -3] ** 2)))
+    assert 0.001 < distance < 1
+
+
+def test_a_skin_as_described_has_row_errors_that_a_file_can_hold():
+    skins = RandomSkins(request(uncertainty=replace(CALM, touch_shapes=0.0)))
+    vectors, distance = skins.row_errors(np.array([skins.sample(k) for k in range(2)]))
+    assert len(vectors) >= 1 and np.abs(vectors).max() < 1e-6
+    assert distance == 1e-6
+
+
+def test_metrics_are_white_noise_and_white_noise_with_the_errors():
+    vectors = np.random.default_rng(6).normal(size=(4, 20)) * 0.1
+    white, with_errors = metrics_of(vectors)
+    assert (white == np.eye(20)).all()
+    covariance = np.eye(20) / 400**2 + 0.25 * vectors.T @ vectors
+    np.testing.assert_allclose(with_errors.T @ with_errors @ covariance, np.eye(20), atol=1e-8)
+
+
+def test_places_by_the_metric_of_the_reduced_data_are_those_of_the_reduced_data():
+    skins = RandomSkins(request())
+    folds = request().projection.shape[1]
+    by_metric = tare_places(skins, [request().projection, np.eye(folds)])
+    reduced = by_metric.reduced
+    assert by_metric.moves.shape[:2] == (2, 2)
+    draw = np.random.default_rng(2)
+    for _ in range(3):
+        y = 0.02 * draw.normal(size=folds)
+        same, white = (moves @ (by_metric.seen @ y) for moves in by_metric.moves)
+        expected = reduced.moves @ (reduced.seen @ y)
+        assert np.abs(same - expected).max() < 0.05 * np.abs(expected).max()
+        assert np.abs(white - expected).max() > 0.05 * np.abs(expected).max()
+
+
+def test_a_model_that_fits_jointly_has_row_errors_and_others_have_none():
+    jointly = draw_model_errors(replace(request(), fits_jointly=True), jobs=2)
+    alone = draw_model_errors(replace(request(), fits_jointly=True), jobs=1)
+    assert errors().rows is None and jointly.rows is not None and alone.rows is not None
+    assert jointly.rows.encode() == alone.rows.encode()
+    assert jointly.encode() == errors().encode()
+    vectors, distance = np.ones((2, 3)), 0.5
+    places = tare_places(RandomSkins(request()), [np.eye(request().projection.shape[1])])
+    made = row_errors(vectors, distance, places)
+    assert made.vectors.dtype == made.seen.dtype == made.moves.dtype == np.float32
+
+
 def test_a_file_of_format_1_9_corrects_no_places():
     model, alone = decode_model(tiny_blob(), "tiny"), np.ones((2, 20), dtype=np.float32)
     sections = encode_sections(replace(model, model_errors=replace(errors(), places=None)))
@@ -212,7 +334,7 @@ def test_the_tare_tells_shifted_electrodes_from_an_uneven_sheet(data_kind):
     """By the variance that each leaves of a place, for references equally far from the model."""
     asked = request(data_kind, replace(FEW, electrode_position_sd=0.02, background_log_sd=0.1))
     skins = RandomSkins(asked)
-    places, draw = tare_places(skins).left, np.random.default_rng(4)
+    places, draw = tare_places(skins).reduced.left, np.random.default_rng(4)
     assert places.dtype == np.float32 and places.shape == (16, len(skins.v_ref))
     apart = {}
     for shifted in (True, False):
@@ -244,13 +366,13 @@ def test_a_skin_thinner_than_the_step_tells_of_places():
     )
     mesh = mesh_for_elements(skin, 600)
     grid = grid_for(skin.outline, 10)
-    places = tare_places(RandomSkins(replace(request(), skin=skin, mesh=mesh, grid=grid)))
+    places = tare_places(RandomSkins(replace(request(), skin=skin, mesh=mesh, grid=grid))).reduced
     assert len(places.left) == 16
     assert all(np.isfinite(part).all() for part in (places.left, places.seen, places.moves))
 
 
 def test_a_skin_that_is_as_described_has_nothing_to_correct():
-    places = tare_places(RandomSkins(request(uncertainty=CALM)))
+    places = tare_places(RandomSkins(request(uncertainty=CALM))).reduced
     assert np.abs(places.left).max() == np.abs(places.moves).max() == 0
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from eitskin.core.diagnostics_table import Touch
+from eitskin.core.options_table import ALL_TOUCH_FIT, JOINT
 from eitskin.core.results import Reconstruction
 from eitskin.model.eitm import decode_model, encode_model
 from eitskin.skin.protocol import adjacent
@@ -146,11 +147,15 @@ def test_the_tare_tells_how_far_a_skin_moves_places():
     on either."""
     model = prebuilt()[0]
     assert model.model_errors is not None
-    without = encode_model(replace(model, model_errors=replace(model.model_errors, places=None)))
+    of_discs = replace(model.model_errors, rows=None)
+    with_, without = (
+        encode_model(replace(model, model_errors=errors))
+        for errors in (of_discs, replace(of_discs, places=None))
+    )
     least: dict[str, list[float]] = {}
     for name in ("discs_1_to_3", "uneven_20_percent", "misplaced_3_mm"):
         scenes = world(name, 6)
-        for content in (blob(), without):
+        for content in (with_, without):
             solver = Reconstructor(decode_model(content, "x"), blob=content)
             variances = []
             for untouched_v, frame_v in zip(scenes.untouched_v, scenes.frames_v, strict=True):
@@ -166,11 +171,14 @@ def test_the_tare_tells_how_far_a_skin_moves_places():
 
 @pytest.mark.parametrize("columns", [1, 60, 120])
 def test_both_widths_stop_at_the_same_column(columns):
-    """With the same touches, and a count that is said to be uncertain where they did."""
+    """With the same touches, and a count that is said to be uncertain where they did. Without the
+    joint fit, by which clear scenes need no test."""
+    fit = ALL_TOUCH_FIT & ~JOINT
     for name in ("ellipses", "two_fingers_12_to_16_mm", "drift_2_percent_light"):
         untouched_v, frame_v = world(name).untouched_v[0], world(name).frames_v[0]
         results = {
-            engine: one(engine, untouched_v, frame_v, test_columns=columns) for engine in ENGINES
+            engine: one(engine, untouched_v, frame_v, test_columns=columns, touch_fit=fit)
+            for engine in ENGINES
         }
         assert agree(results) > 0
         warned = ["crowded" in result.info.diagnostics_by_name for result in results.values()]
@@ -271,7 +279,8 @@ def test_row_gains_undo_what_multiplies_rows(engine):
     assert straight.touches
     few, many = row_factors(0.12), row_factors(0.4)
     undone = one(engine, few * untouched_v, few * frame_v)
-    assert np.abs(sizes_mm(undone) - sizes_mm(straight)).max() <= 0.05
+    # rows that far from the model are fitted with the model's errors in the metric
+    assert np.abs(sizes_mm(undone) - sizes_mm(straight)).max() <= 0.8
     assert "unlike the model" not in undone.info.diagnostics_by_name
     left = one(engine, few * untouched_v, few * frame_v, row_gains=0)
     assert len(left.touches) != len(straight.touches) or (

@@ -199,7 +199,7 @@ BAD_OPTIONS = [
     ({"max_masked": -1}, "max_masked"),
     ({"mac_limit": -1}, "mac_limit"),
     ({"diagnostics": 512}, "diagnostics = 512 is out of range; use 0 to 511"),
-    ({"touch_fit": 8}, "touch_fit = 8 is out of range; use 0 to 7"),
+    ({"touch_fit": 8}, "touch_fit = 8 is out of range: it has bits without a meaning"),
     ({"touch_fit": -1}, "touch_fit"),
     ({"second_pass": 2}, "second_pass = 2 must be true or false"),
     ({"sign": "up"}, "sign = 'up' is not known; use one of increase, decrease, both"),

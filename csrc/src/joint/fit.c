@@ -1,0 +1,352 @@
+/* F, its normal equations, and the way to its minimum.
+ *
+ * Slopes hold the induced field, which each evaluation carries one round further: it follows the
+ * shapes as they settle. Folds are taken in blocks, so that the columns of all parameters need
+ * memory for one block and not for the whole frame; of the whole frame there are the normal
+ * equations alone, and of each column and of the data its products with what no touch causes
+ * (metric.c), which are taken out at the end.
+ *
+ * Levenberg's and Marquardt's damping, relative to the diagonal: a step that does not lower F is
+ * tried again, damped more; one that does lowers the damping. Each step is shortened as a whole
+ * where a parameter would move further than the linearisation holds. */
+#include "joint/joint.h"
+
+#include "base/cholesky.h"
+#include "base/log.h"
+#include "base/vec.h"
+#include "joint/constants.h"
+#include "kernels/kernels.h"
+
+enum { BLOCK = EITS_JOINT_BLOCK, MAX_PARAMETERS = EITS_JOINT_PARAMETERS };
+
+eits_real eits_joint_freedom(const eits_context *ctx, const eits_joint *j)
+{
+    const eits_real free =
+        (eits_real)eits_joint_folds(ctx) - 1 - (eits_real)(EITS_JOINT_DISC * j->count);
+    return eits_larger(free, EITS_JOINT_MIN_FREEDOM);
+}
+
+eits_real eits_joint_excess(const eits_context *ctx, const eits_joint *j)
+{
+    return eits_larger(j->misfit / eits_joint_freedom(ctx, j), 1);
+}
+
+/* ---- priors ---- */
+
+/* How far parameter p of a shape is from where its prior would have it. A radius is expected where
+ * a fit's seed has it, and an amplitude where touches of contrast 3 to 10 have theirs, of either
+ * sign; places have no prior. */
+static eits_real offset(const eits_context *ctx, const eits_shape *s, uint32_t p)
+{
+    const eits_real expected =
+        EITS_JOINT_RADIUS * ctx->options.touch_seed_radius_mm / (eits_real)ctx->model->pixel_mm;
+    switch (p) {
+    case 2:
+        /* of numbers that are not above 0, or not finite, there is no logarithm */
+        return eits_log(eits_clamp(s->radius / expected, R(1e-6), R(1e6)));
+    case 3:
+        return s->amplitude - (s->amplitude < 0 ? -EITS_JOINT_AMPLITUDE : EITS_JOINT_AMPLITUDE);
+    case 4:
+        return s->e1;
+    case 5:
+        return s->e2;
+    default:
+        return 0;
+    }
+}
+
+static eits_real deviation(uint32_t p)
+{
+    return p == 2   ? EITS_JOINT_RADIUS_SPREAD
+           : p == 3 ? EITS_JOINT_AMPLITUDE_SPREAD
+                    : EITS_JOINT_SHAPE_SPREAD;
+}
+
+/* A light touch has an amplitude far from the expected one, so its prior has a heavy tail: beside
+ * (off / deviation)^2 = t, it costs T log(1 + t / T), about which the normal equations have the
+ * weight 1 / (1 + t / T). */
+static eits_real tail(const eits_context *ctx, const eits_shape *s)
+{
+    const eits_real off = offset(ctx, s, 3) / EITS_JOINT_AMPLITUDE_SPREAD;
+    return eits_fma(off, off / EITS_JOINT_AMPLITUDE_TAIL, 1);
+}
+
+static eits_real precision(const eits_context *ctx, const eits_shape *s, uint32_t p)
+{
+    if (p < 2)
+        return 0;
+    return 1 / (deviation(p) * deviation(p) * (p == 3 ? tail(ctx, s) : 1));
+}
+
+eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_t parameters)
+{
+    eits_real sum = EITS_JOINT_AMPLITUDE_TAIL * eits_log(tail(ctx, s));
+    for (uint32_t p = 2; p < parameters; ++p) {
+        const eits_real off = p == 3 ? 0 : offset(ctx, s, p) / deviation(p);
+        sum = eits_fma(off, off, sum);
+    }
+    return sum;
+}
+
+static eits_real prior_of(const eits_context *ctx, const eits_joint *j)
+{
+    eits_real sum = 0;
+    for (uint32_t k = 0; k < j->count; ++k)
+        sum += eits_joint_prior(ctx, &j->shape[k], j->parameters);
+    return sum;
+}
+
+/* ---- F and its normal equations ---- */
+
+static const eits_poles *poles_of(const eits_joint *j)
+{
+    static const eits_poles discs = {.orders = 3, .sent = 2}, ellipses = {.orders = 5, .sent = 3};
+    return j->parameters == EITS_JOINT_DISC ? &discs : &ellipses;
+}
+
+/* Sums over blocks of folds. */
+typedef struct sums {
+    eits_real square;                      /* of what is left */
+    eits_real along[EITS_JOINT_NUISANCES]; /* its products with what no touch causes */
+} sums;
+
+static eits_real *along_of(eits_context *ctx, uint32_t a)
+{
+    return ctx->joint.along + (size_t)EITS_JOINT_NUISANCES * a;
+}
+
+static eits_real product(const eits_real *a, const eits_real *b, uint32_t count)
+{
+    eits_real sum = 0;
+    for (uint32_t i = 0; i < count; ++i)
+        sum = eits_fma(a[i], b[i], sum);
+    return sum;
+}
+
+/* The weighed columns of one block, into the normal equations. */
+static void add_columns(eits_context *ctx, uint32_t n, uint32_t first, uint32_t count,
+                        const eits_real *left)
+{
+    eits_joint_memory *m = &ctx->joint;
+    const eits_real *weight = m->weight + first;
+    for (uint32_t a = 0; a < n; ++a) {
+        eits_real *column = m->column + (size_t)BLOCK * a, *row = eits_lower_row(m->normal, a);
+        for (uint32_t i = 0; i < count; ++i)
+            column[i] *= weight[i];
+        eits_joint_add_along(ctx, column, first, count, along_of(ctx, a));
+        m->gradient[a] += eits_dot(ctx->kernels, column, left, count);
+        for (uint32_t b = 0; b <= a; ++b)
+            row[b] += eits_dot(ctx->kernels, column, m->column + (size_t)BLOCK * b, count);
+    }
+}
+
+/* What the shapes leave of one block, weighed, and their columns into the normal equations. */
+static uint64_t add_block(eits_context *ctx, const eits_joint *j, uint32_t first, uint32_t count,
+                          sums *s)
+{
+    eits_joint_memory *m = &ctx->joint;
+    eits_real value[BLOCK], left[BLOCK];
+    uint64_t macs = 4u * (uint64_t)count;
+    eits_copy(left, ctx->frame.d + first, count);
+    for (uint32_t k = 0, free = 0; k < j->count; ++k) {
+        eits_pole_out out = {.value = value};
+        const int varies = free < j->free_count && j->free[free] == k;
+        for (uint32_t p = 0; varies && p < j->parameters; ++p)
+            out.slope[p] = m->column + (size_t)BLOCK * (free * j->parameters + p);
+        free += (uint32_t)varies;
+        macs += eits_pole_rows(ctx, k, &j->shape[k], poles_of(j), first, count, &out);
+        for (uint32_t i = 0; i < count; ++i)
+            left[i] -= value[i];
+    }
+    for (uint32_t i = 0; i < count; ++i)
+        left[i] *= m->weight[first + i];
+    s->square += eits_dot(ctx->kernels, left, left, count);
+    eits_joint_add_along(ctx, left, first, count, s->along);
+    const uint32_t n = j->free_count * j->parameters;
+    add_columns(ctx, n, first, count, left);
+    return macs + (uint64_t)n * (n + 7u + 2u * m->errors) / 2u * count;
+}
+
+/* What no touch causes out of the normal equations, and the priors into them. */
+static void finish_normal(eits_context *ctx, const eits_joint *j, const sums *s)
+{
+    eits_joint_memory *m = &ctx->joint;
+    const uint32_t nuisances = 1u + m->errors;
+    for (uint32_t a = 0; a < j->free_count * j->parameters; ++a) {
+        const uint32_t p = a % j->parameters;
+        const eits_shape *shape = &j->shape[j->free[a / j->parameters]];
+        const eits_real prior = precision(ctx, shape, p);
+        eits_real *row = eits_lower_row(m->normal, a), *along = along_of(ctx, a);
+        eits_joint_finish_along(ctx, along);
+        m->gradient[a] -= product(along, s->along, nuisances);
+        m->gradient[a] = eits_fma(-prior, offset(ctx, shape, p), m->gradient[a]);
+        for (uint32_t b = 0; b <= a; ++b)
+            row[b] -= product(along, along_of(ctx, b), nuisances);
+        row[a] += prior;
+    }
+}
+
+uint64_t eits_joint_evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds)
+{
+    eits_joint_memory *m = &ctx->joint;
+    const uint32_t folds = ctx->model->n_folded;
+    sums s = {.square = 0};
+    uint64_t macs = 0;
+    for (uint32_t k = 0; k < j->count; ++k)
+        macs += eits_pole_home(ctx, k, &j->shape[k]);
+    macs += eits_pole_induced(ctx, j->shape, j->count, poles_of(j), rounds);
+    eits_zero(m->normal, EITS_LOWER_SIZE(MAX_PARAMETERS));
+    eits_zero(m->gradient, MAX_PARAMETERS);
+    eits_zero(m->along, (size_t)EITS_JOINT_NUISANCES * MAX_PARAMETERS);
+    for (uint32_t first = 0; first < folds; first += BLOCK) {
+        const uint32_t count = folds - first < BLOCK ? folds - first : BLOCK;
+        macs += add_block(ctx, j, first, count, &s);
+    }
+    j->left = eits_fma(-s.along[0], s.along[0], s.square);
+    eits_joint_finish_along(ctx, s.along);
+    j->misfit = s.square - product(s.along, s.along, 1u + m->errors);
+    j->cost = j->misfit + prior_of(ctx, j);
+    finish_normal(ctx, j, &s);
+    return macs;
+}
+
+/* ---- steps ---- */
+
+/* The normal matrix, its diagonal raised by `damping`, becomes L L' in m->factor. A pivot that is
+ * rounding, of two touches in one place, is held up: the step along it is short, not infinite. */
+static void factor(eits_context *ctx, uint32_t n, eits_real damping)
+{
+    eits_joint_memory *m = &ctx->joint;
+    eits_copy(m->factor, m->normal, EITS_LOWER_SIZE(n));
+    for (uint32_t i = 0; i < n; ++i) {
+        eits_real *row = eits_lower_row(m->factor, i);
+        const eits_real least = EITS_JOINT_MIN_PIVOT * row[i];
+        row[i] *= 1 + damping;
+        row[i] = eits_sqrt(eits_larger(eits_cholesky_row(m->factor, i), least));
+    }
+}
+
+static void solve(eits_context *ctx, uint32_t n, eits_real *v)
+{
+    eits_lower_solve(ctx->joint.factor, n, v);
+    eits_lower_solve_transposed(ctx->joint.factor, n, v);
+}
+
+/* The shapes a step further. One that would leave the skin stays where it is; its other parameters
+ * move. */
+static eits_joint moved(const eits_context *ctx, const eits_joint *from, const eits_real *step)
+{
+    static const eits_real most[EITS_JOINT_ELLIPSE] = {EITS_JOINT_MAX_MOVE,   EITS_JOINT_MAX_MOVE,
+                                                       EITS_JOINT_MAX_GROWTH, EITS_JOINT_MAX_GAIN,
+                                                       EITS_JOINT_MAX_SHAPE,  EITS_JOINT_MAX_SHAPE};
+    eits_real over = 1;
+    eits_joint to = *from;
+    for (uint32_t a = 0; a < from->free_count * from->parameters; ++a)
+        over = eits_larger(over, eits_fabs(step[a]) / most[a % from->parameters]);
+    for (uint32_t i = 0; i < from->free_count; ++i) {
+        const eits_real *s = step + i * from->parameters, part = 1 / over, grow = part * s[2];
+        eits_shape *shape = &to.shape[from->free[i]];
+        const eits_real x = eits_fma(part, s[0], shape->x), y = eits_fma(part, s[1], shape->y);
+        if (eits_pole_on_skin(ctx, x, y)) {
+            shape->x = x;
+            shape->y = y;
+        }
+        /* e^grow, up to the third order of a step that is small */
+        shape->radius *= eits_fma(grow, eits_fma(R(0.5), grow, 1), 1);
+        shape->amplitude = eits_clamp(eits_fma(part, s[3], shape->amplitude),
+                                      -EITS_JOINT_MAX_AMPLITUDE, EITS_JOINT_MAX_AMPLITUDE);
+        if (from->parameters == EITS_JOINT_ELLIPSE) {
+            shape->e1 = eits_clamp(eits_fma(part, s[4], shape->e1), -EITS_JOINT_MAX_ETA,
+                                   EITS_JOINT_MAX_ETA);
+            shape->e2 = eits_clamp(eits_fma(part, s[5], shape->e2), -EITS_JOINT_MAX_ETA,
+                                   EITS_JOINT_MAX_ETA);
+        }
+    }
+    return to;
+}
+
+void eits_joint_descend(eits_context *ctx, eits_joint *j, uint32_t rounds, eits_real hopeless,
+                        uint64_t *macs)
+{
+    const uint32_t n = j->free_count * j->parameters;
+    const uint64_t begin = *macs;
+    eits_real damping = EITS_JOINT_DAMPING;
+    *macs += eits_joint_evaluate(ctx, j, rounds);
+    const uint64_t each = *macs - begin + (uint64_t)n * n * (n + 6u) / 6u;
+    for (uint32_t step = 0; step < EITS_JOINT_STEPS; ++step) {
+        eits_real d[MAX_PARAMETERS];
+        factor(ctx, n, damping);
+        eits_copy(d, ctx->joint.gradient, n);
+        solve(ctx, n, d);
+        const eits_real predicted = eits_dot(ctx->kernels, ctx->joint.gradient, d, n);
+        if (!(predicted > EITS_JOINT_SETTLED) ||
+            ((step > 0 || j->parameters == EITS_JOINT_DISC) && j->cost - predicted > hopeless) ||
+            *macs + 2u * each > EITS_JOINT_WORK) /* a step, and the way back from it */
+            return;
+        eits_joint trial = moved(ctx, j, d);
+        *macs += eits_joint_evaluate(ctx, &trial, 1) + (uint64_t)n * n * (n + 6u) / 6u;
+        const eits_real fallen = j->cost - trial.cost;
+        if (fallen > 0) {
+            *j = trial;
+            damping *= EITS_JOINT_DAMP_LESS;
+            if (eits_fabs(predicted - fallen) < EITS_JOINT_AS_PREDICTED * eits_joint_excess(ctx, j))
+                return;
+        } else { /* back, to a shorter step */
+            *macs += eits_joint_evaluate(ctx, j, 1);
+            damping = eits_larger(EITS_JOINT_DAMP_MORE * damping, EITS_JOINT_DAMPED);
+        }
+    }
+}
+
+void eits_joint_free_all(eits_joint *j)
+{
+    j->free_count = j->count;
+    for (uint32_t k = 0; k < j->count; ++k)
+        j->free[k] = k;
+}
+
+/* By the block of A^-1 of one shape's parameters: its inverse is what all others leave of A. */
+static void know(const eits_context *ctx, const eits_joint *j, uint32_t k, eits_real *block,
+                 eits_joint_known *known)
+{
+    const uint32_t amplitude = 3, p = j->parameters;
+    const eits_real q = j->shape[k].amplitude;
+    eits_real unit[EITS_JOINT_ELLIPSE] = {0};
+    known->place[0] = eits_lower_row(block, 0)[0];
+    known->place[1] = eits_lower_row(block, 1)[0];
+    known->place[2] = eits_lower_row(block, 1)[1];
+    known->shape = 0;
+    for (uint32_t i = EITS_JOINT_DISC; i < p; ++i) {
+        const eits_real e = i == EITS_JOINT_DISC ? j->shape[k].e1 : j->shape[k].e2;
+        known->shape = eits_fma(e / eits_lower_row(block, i)[i], e, known->shape);
+    }
+    for (uint32_t i = 0; i < p; ++i) {
+        eits_real *row = eits_lower_row(block, i);
+        const eits_real least = EITS_JOINT_MIN_PIVOT * row[i];
+        row[i] = eits_sqrt(eits_larger(eits_cholesky_row(block, i), least));
+    }
+    unit[amplitude] = 1;
+    eits_lower_solve(block, p, unit);
+    eits_lower_solve_transposed(block, p, unit);
+    known->rise =
+        q * q *
+        (unit[amplitude] - precision(ctx, &j->shape[k], amplitude)); /* a prior is no evidence */
+}
+
+uint64_t eits_joint_places(eits_context *ctx, const eits_joint *j, eits_joint_known *known)
+{
+    const uint32_t p = j->parameters, n = j->count * p;
+    factor(ctx, n, 0);
+    for (uint32_t k = 0; k < j->count; ++k) {
+        eits_real block[EITS_LOWER_SIZE(EITS_JOINT_ELLIPSE)];
+        for (uint32_t i = 0; i < p; ++i) {
+            eits_real column[MAX_PARAMETERS] = {0};
+            column[k * p + i] = 1;
+            solve(ctx, n, column);
+            for (uint32_t l = 0; l <= i; ++l)
+                eits_lower_row(block, i)[l] = column[k * p + l];
+        }
+        know(ctx, j, k, block, &known[k]);
+    }
+    return (uint64_t)n * n * (n / 6u + n);
+}

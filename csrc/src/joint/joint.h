@@ -1,0 +1,115 @@
+/* All touches of a frame fitted at once to its folded data by the multipole model: places, radii,
+ * strengths, ellipses where the data support them, and how well each place is known.
+ *
+ *     F = sum over folds ((d - answers) / sigma)^2 - (what the gain's drift explains of it)
+ *         + sum over touches of h((|q| - Q) / dQ) + (log(r / R) / dR)^2 + (e_1^2 + e_2^2) / dE^2
+ *
+ * is minimised by damped Gauss-Newton steps (fit.c). sigma^2 is the noise of a fold and what the
+ * multipole model itself errs by, a fraction of the data (report.c). */
+#ifndef EITSKIN_JOINT_H
+#define EITSKIN_JOINT_H
+
+#include "evidence/evidence.h"
+#include "multipole/multipole.h"
+
+/* Parameters of a touch in the order of eits_pole_out: x, y (pixels), log radius, amplitude and,
+ * for an ellipse, e1 and e2. */
+enum { EITS_JOINT_DISC = 4, EITS_JOINT_ELLIPSE = 6 };
+
+/* Touches under the fit. */
+typedef struct eits_joint {
+    eits_shape shape[EITS_MAX_TOUCHES];
+    uint32_t from[EITS_MAX_TOUCHES]; /* which of the fit's discs it was or was part of */
+    uint32_t free[EITS_MAX_TOUCHES]; /* those that are varied, by ascending number */
+    uint64_t spent;                  /* multiply-accumulates of settling in this frame */
+    uint32_t count, free_count;
+    uint32_t parameters; /* of each: EITS_JOINT_DISC or EITS_JOINT_ELLIPSE */
+    eits_real cost;      /* F */
+    eits_real misfit;    /* its first line: the data's part */
+    eits_real left;      /* the same as if the model had no errors: what is left of the data */
+} eits_joint;
+
+/* metric.c */
+
+/* Set 1 / sigma of each fold, 0 where it is left out, and what no touch causes in that metric: the
+ * drift of the gain, and the model's errors. Returns the multiply-accumulates. */
+uint64_t eits_joint_metric(eits_context *ctx);
+
+/* Folds in use. */
+uint32_t eits_joint_folds(const eits_context *ctx);
+
+/* |W d|^2 less its part along the drift. */
+eits_real eits_joint_data(const eits_context *ctx);
+
+/* Add the products of a weighted column, folds first ... first + count - 1, with what no touch
+ * causes: 1 + joint.errors numbers. */
+void eits_joint_add_along(const eits_context *ctx, const eits_real *column, uint32_t first,
+                          uint32_t count, eits_real *along);
+
+/* L^-1 of these sums: a product of two columns loses the product of their numbers. */
+void eits_joint_finish_along(eits_context *ctx, eits_real *along);
+
+/* fit.c */
+
+/* F of the shapes as they are, after `rounds` more of what they send each other, and the normal
+ * equations about them. Returns the multiply-accumulates. */
+uint64_t eits_joint_evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds);
+
+/* Steps until F hardly falls, or falls as the linearisation said, or would stay above `hopeless`;
+ * at most EITS_JOINT_STEPS, and none that would take the work of this frame above EITS_JOINT_WORK.
+ * Adds to `macs`. The normal equations are those about *j then. */
+void eits_joint_descend(eits_context *ctx, eits_joint *j, uint32_t rounds, eits_real hopeless,
+                        uint64_t *macs);
+
+/* All shapes are varied. */
+void eits_joint_free_all(eits_joint *j);
+
+/* The prior's part of F for one shape. */
+eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_t parameters);
+
+/* settle.c: to the minimum of F: as discs, and as ellipses where discs leave more than noise and
+ * ellipses lower F by enough. Returns the multiply-accumulates. */
+uint64_t eits_joint_settle(eits_context *ctx, eits_joint *j);
+
+/* split.c: try what is long as two. `spent` is the frame's work so far; returns what was added. The
+ * normal equations are those about *j then. */
+uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent);
+
+/* Numbers that the data have beside what the shapes take. */
+eits_real eits_joint_freedom(const eits_context *ctx, const eits_joint *j);
+
+/* How much worse the data fit than sigma says, at least 1. */
+eits_real eits_joint_excess(const eits_context *ctx, const eits_joint *j);
+
+/* What the normal equations where the touches are tell of a touch, all other parameters free. */
+typedef struct eits_joint_known {
+    eits_real place[3]; /* covariance of x and y, pixels^2: xx, xy, yy */
+    eits_real shape;    /* how far e1 and e2 are from 0, in variances; 0 for a disc */
+    eits_real rise;     /* of F where its amplitude is 0 and the others make up for it */
+} eits_joint_known;
+
+/* known[0 ... j->count - 1]; the normal equations are those about *j. */
+uint64_t eits_joint_places(eits_context *ctx, const eits_joint *j, eits_joint_known *known);
+
+/* merge.c: every group of shapes of one sign, each so near to another of it that they may be parts
+ * of one, becomes one ellipse of the group's area, strength and extent. Returns how many are fewer.
+ */
+uint32_t eits_joint_merge(eits_joint *j);
+
+/* Whether two shapes of one sign are nearer than so many sums of their radii. */
+int eits_joint_near(const eits_shape *a, const eits_shape *b, eits_real radii);
+
+/* report.c */
+
+/* Before the test: fit the discs of `f` jointly, in *j. Where they explain the frame, each is
+ * needed and no two may be one, no test is needed: *f becomes the result, as if tested, and 1 is
+ * returned. Else *f stays as it is. Does nothing where the model has no fields, where the option is
+ * off, and on an instrument that is far from the model; j->count is 0 then. */
+int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j);
+
+/* After the test: the same for the touches that it left; *j is from eits_fit_clearly. Touches stay
+ * as they are where the joint fit leaves too much of the data, and on a sheet that has drifted, of
+ * which the metric does not know. */
+void eits_fit_jointly(eits_context *ctx, eits_fit *f, eits_joint *j);
+
+#endif

@@ -1,0 +1,162 @@
+/* The metric of the joint fit, and what no touch causes.
+ *
+ * Folds have independent noise of one variance. Beside it, the data may have any amount of the
+ * drift of the gain, and, on a skin that is far from the model, the model's errors: the second
+ * moment s |d|^2 sum e e' (section ROWE), where s grows with the square of the distance of the
+ * reference from the model. With W the weights, B the columns W e s^1/2 |d| and g the direction of
+ * the drift in that metric,
+ *
+ *     (W^-2 + errors + infinity g g')^-1 = W (1 - [g B] M^-1 [g B]') W,
+ *     M = [g B]'[g B] + diag(0, 1, ..., 1) = L L'
+ *
+ * so that products of weighted columns lose the products of L^-1 [g B]' times these columns. */
+#include "joint/joint.h"
+
+#include "base/cholesky.h"
+#include "base/vec.h"
+#include "context/places.h"
+#include "diagnostics/diagnostics.h"
+#include "joint/constants.h"
+#include "kernels/kernels.h"
+
+uint32_t eits_joint_folds(const eits_context *ctx)
+{
+    uint32_t used = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k)
+        used += ctx->frame.sides[k] != EITS_SIDE_NONE;
+    return used;
+}
+
+eits_real eits_joint_data(const eits_context *ctx)
+{
+    const eits_joint_memory *m = &ctx->joint;
+    eits_real square = 0, along = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const eits_real d = m->weight[k] * ctx->frame.d[k];
+        square = eits_fma(d, d, square);
+        along = eits_fma(d, m->drift[k], along);
+    }
+    return eits_fma(-along, along, square);
+}
+
+/* Weights of 0 and 1, and the drift's direction over these folds. */
+static void take_folds(eits_context *ctx)
+{
+    eits_joint_memory *m = &ctx->joint;
+    eits_real square = 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        m->weight[k] = ctx->frame.sides[k] == EITS_SIDE_NONE ? 0 : 1;
+        m->drift[k] = m->weight[k] * ctx->projection.gain_drift[k];
+        square = eits_fma(m->drift[k], m->drift[k], square);
+    }
+    const eits_real norm = square > 0 ? 1 / eits_sqrt(square) : 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k)
+        m->drift[k] *= norm;
+}
+
+/* The variance of a fold: the noise's mean over the folds in use, and what the multipole model
+ * itself errs by. */
+static eits_real fold_variance(const eits_context *ctx, eits_real energy)
+{
+    const eits_real least = EITS_JOINT_MIN_NOISE * ctx->reference.gain * ctx->reference.v0_rms,
+                    folds = (eits_real)eits_joint_folds(ctx), used = eits_larger(folds, 1),
+                    noise = eits_noise_energy(ctx) / used;
+    return eits_larger(noise, least * least) +
+           EITS_JOINT_MODEL_ERROR * EITS_JOINT_MODEL_ERROR * energy / used;
+}
+
+/* s |d|^2 */
+static eits_real error_energy(const eits_context *ctx, eits_real energy)
+{
+    if (!eits_weighs_errors(ctx))
+        return 0;
+    const eits_real far = ctx->reference.distance / (eits_real)ctx->model->row_errors.distance;
+    return EITS_JOINT_ERROR_SHARE * (far < 1 ? far * far : 1) * energy;
+}
+
+/* Vectors are stored strongest first; the rest would be far below the noise. */
+static uint32_t errors_above_noise(const eits_context *ctx, eits_real errors, eits_real noise)
+{
+    const eits_row_errors *e = &ctx->model->row_errors;
+    eits_real size[EITS_MAX_PLACE_ROWS] = {0};
+    uint32_t count = 0;
+    if (!(errors > 0))
+        return 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        for (uint32_t i = 0; i < e->count; ++i) {
+            const eits_real v = (eits_real)e->vectors[(size_t)e->count * k + i];
+            size[i] = eits_fma(v, v, size[i]);
+        }
+    }
+    while (count < e->count && errors * size[count] > EITS_JOINT_ERROR_MIN * noise)
+        ++count;
+    return count;
+}
+
+/* Add `column`'s products with the vectors of folds first ... first + count - 1; their unit is
+ * missing. */
+static void along_errors(const eits_context *ctx, const eits_real *column, uint32_t first,
+                         uint32_t count, eits_real *along)
+{
+    const eits_row_errors *e = &ctx->model->row_errors;
+    for (uint32_t k = 0; k < count; ++k) {
+        const float *vector = e->vectors + (size_t)e->count * (first + k);
+        for (uint32_t i = 0; i < ctx->joint.errors; ++i)
+            along[i] = eits_fma(column[k], (eits_real)vector[i], along[i]);
+    }
+}
+
+/* M and its factor. */
+static uint64_t factor_nuisances(eits_context *ctx)
+{
+    eits_joint_memory *m = &ctx->joint;
+    const eits_row_errors *e = &ctx->model->row_errors;
+    const uint32_t folds = ctx->model->n_folded, n = 1u + m->errors;
+    eits_zero(m->nuisance, EITS_LOWER_SIZE(n));
+    for (uint32_t k = 0; k < folds && n > 1; ++k) {
+        const float *vector = e->vectors + (size_t)e->count * k;
+        const eits_real on = m->weight[k] > 0 ? m->error_unit : 0;
+        for (uint32_t i = 1; i < n; ++i) {
+            eits_real *row = eits_lower_row(m->nuisance, i);
+            const eits_real v = on * (eits_real)vector[i - 1u];
+            row[0] = eits_fma(v, m->drift[k], row[0]);
+            for (uint32_t j = 1; j <= i; ++j)
+                row[j] = eits_fma(v, on * (eits_real)vector[j - 1u], row[j]);
+        }
+    }
+    m->nuisance[0] = 1; /* where there is no drift, no column has a part along it */
+    for (uint32_t i = 1; i < n; ++i) {
+        eits_real *row = eits_lower_row(m->nuisance, i);
+        row[i] += 1;
+        /* at least the 1 just added but for rounding */
+        row[i] = eits_sqrt(eits_larger(eits_cholesky_row(m->nuisance, i), R(0.5)));
+    }
+    return (uint64_t)folds * n * n / 2u + (uint64_t)n * n * n / 6u;
+}
+
+uint64_t eits_joint_metric(eits_context *ctx)
+{
+    eits_joint_memory *m = &ctx->joint;
+    take_folds(ctx);
+    const eits_real energy = eits_joint_data(ctx), variance = fold_variance(ctx, energy),
+                    errors = error_energy(ctx, energy), unit = 1 / eits_sqrt(variance);
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k)
+        m->weight[k] *= unit;
+    m->errors = errors_above_noise(ctx, errors, variance);
+    m->error_unit = unit * eits_sqrt(errors);
+    return factor_nuisances(ctx);
+}
+
+void eits_joint_add_along(const eits_context *ctx, const eits_real *column, uint32_t first,
+                          uint32_t count, eits_real *along)
+{
+    along[0] += eits_dot(ctx->kernels, column, ctx->joint.drift + first, count);
+    along_errors(ctx, column, first, count, along + 1);
+}
+
+void eits_joint_finish_along(eits_context *ctx, eits_real *along)
+{
+    for (uint32_t i = 0; i < ctx->joint.errors; ++i)
+        along[i + 1u] *= ctx->joint.error_unit;
+    eits_lower_solve(ctx->joint.nuisance, 1u + ctx->joint.errors, along);
+}

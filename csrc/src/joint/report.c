@@ -1,0 +1,222 @@
+/* From fitted discs to the joint fit and back. */
+#include "joint/joint.h"
+
+#include "base/vec.h"
+#include "context/places.h"
+#include "evidence/constants.h"
+#include "joint/constants.h"
+#include "kernels/kernels.h"
+
+/* The sheet's conductivity, S/m. */
+static eits_real sheet_of(const eits_model *model)
+{
+    const eits_real two_pi = R(6.28318530717958647693);
+    return 1 / (two_pi * (eits_real)model->fields.per_sheet);
+}
+
+/* A shape of the disc's strength q r^2 with the amplitude `q`. */
+static eits_shape shape_of(const eits_context *ctx, const eits_disc *d, eits_real q)
+{
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm, r = d->radius_mm / pixel,
+                    strength = eits_fabs(d->change) / sheet_of(model) * r * r;
+    return (eits_shape){
+        .x = (d->x_mm - (eits_real)model->origin_x_mm) / pixel,
+        .y = (d->y_mm - (eits_real)model->origin_y_mm) / pixel,
+        .radius = eits_sqrt(strength / q),
+        .amplitude = d->change < 0 ? -q : q,
+    };
+}
+
+/* The fit's discs as shapes, each of the strength that was found: strong and small, or light and
+ * large, whichever is the likelier by the priors. */
+static eits_joint begin(const eits_context *ctx, const eits_fit *f, uint64_t spent)
+{
+    eits_joint j = {.spent = spent, .count = f->count, .parameters = EITS_JOINT_DISC};
+    for (uint32_t k = 0; k < f->count; ++k) {
+        const eits_disc *d = &f->disc[k];
+        const eits_shape strong = shape_of(ctx, d, EITS_JOINT_AMPLITUDE),
+                         light = shape_of(ctx, d, EITS_JOINT_LIGHT);
+        j.from[k] = k;
+        j.shape[k] = eits_joint_prior(ctx, &light, EITS_JOINT_DISC) <
+                             eits_joint_prior(ctx, &strong, EITS_JOINT_DISC)
+                         ? light
+                         : strong;
+    }
+    return j;
+}
+
+static int all_finite(const eits_joint *j)
+{
+    int finite = eits_is_finite(j->cost);
+    for (uint32_t k = 0; k < j->count; ++k) {
+        const eits_shape *s = &j->shape[k];
+        const eits_real numbers[] = {s->x, s->y, s->radius, s->amplitude, s->e1, s->e2};
+        finite &= eits_all_finite(numbers, sizeof numbers / sizeof numbers[0]);
+    }
+    return finite;
+}
+
+/* Half of the long axis as a vector; 0, 0 for a disc. a = r ((1 + eta) / (1 - eta))^1/2. */
+static void long_axis(const eits_shape *s, eits_real pixel, eits_real axis_mm[2])
+{
+    const eits_real eta = eits_sqrt(eits_fma(s->e1, s->e1, s->e2 * s->e2));
+    axis_mm[0] = axis_mm[1] = 0;
+    if (!(eta > EITS_JOINT_ROUND))
+        return;
+    const eits_real half = pixel * s->radius * eits_sqrt((1 + eta) / (1 - eta));
+    eits_half_angle(s->e1, s->e2, eta, axis_mm);
+    axis_mm[0] *= half;
+    axis_mm[1] *= half;
+}
+
+/* What nothing in the frame tells of a place, mm^2: what is left after the correction by the
+ * reference, and what the model's own error moves. */
+static eits_real variance_of_all(const eits_context *ctx)
+{
+    const eits_reference *b = &ctx->reference;
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm,
+                    trust = eits_corrects_places(ctx) ? b->place_trust : 0,
+                    stays = pixel * pixel * EITS_PLACE_DISTANCE * b->distance;
+    return pixel * pixel * EITS_JOINT_PLACE_MIN +
+           eits_fma(trust, EITS_PLACE_GEOMETRY * b->place_mm2 - stays, stays);
+}
+
+/* Touch k is a part of what was disc `of`: it is as sure as that was. */
+static void inherit(eits_fit *f, uint32_t of, uint32_t k)
+{
+    f->rise[k] = f->rise[of];
+    f->pair[k] = f->pair[of];
+    f->confidence[k] = f->confidence[of];
+}
+
+static void report(eits_context *ctx, const eits_joint *j, const eits_joint_known *known,
+                   eits_fit *f)
+{
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm, sheet = sheet_of(model),
+                    least = variance_of_all(ctx), excess = eits_joint_excess(ctx, j),
+                    unit = pixel * pixel * excess;
+    const eits_real whole = eits_joint_data(ctx);
+    ctx->info.unexplained = whole > 0 && j->left > 0 ? j->left / whole : 0;
+    f->count = j->count;
+    f->joint = 1;
+    for (uint32_t k = 0; k < j->count; ++k) {
+        const eits_shape *s = &j->shape[k];
+        const eits_real *place = known[k].place;
+        eits_disc *d = &f->disc[k];
+        f->explained[k] = whole > 0 ? known[k].rise / whole : 0;
+        d->polarity = s->amplitude < 0 ? R(-1) : R(1);
+        d->x_mm = eits_fma(s->x, pixel, (eits_real)model->origin_x_mm);
+        d->y_mm = eits_fma(s->y, pixel, (eits_real)model->origin_y_mm);
+        d->radius_mm = s->radius * pixel;
+        d->change = sheet * s->amplitude;
+        long_axis(s, pixel, f->long_mm[k]);
+        if (!(known[k].shape > EITS_JOINT_LONG * excess)) /* a disc, as far as the data tell */
+            eits_zero(f->long_mm[k], 2);
+        f->ellipse_mm[k][0] = d->x_mm;
+        f->ellipse_mm[k][1] = d->y_mm;
+        f->ellipse_mm[k][2] = d->radius_mm;
+        f->place_mm2[k][0] = eits_fma(unit, place[0], least);
+        f->place_mm2[k][1] = unit * place[1];
+        f->place_mm2[k][2] = eits_fma(unit, place[2], least);
+    }
+}
+
+/* Whether the fit has what the joint fit takes, and the skin is one that the model describes. */
+static int may_fit(const eits_context *ctx, const eits_fit *f)
+{
+    return f->count > 0 && f->count * EITS_JOINT_DISC <= EITS_JOINT_PARAMETERS &&
+           ctx->options.touch_test && !ctx->reference.far && eits_may_fit_jointly(ctx) &&
+           ctx->model->uncertainty.errors != NULL;
+}
+
+/* Whether the shapes explain the frame. */
+static int explains(const eits_context *ctx, const eits_joint *j)
+{
+    return all_finite(j) && j->left < EITS_JOINT_MAX_LEFT * eits_joint_data(ctx);
+}
+
+/* Whether any two shapes are so near that they may be one. */
+static int any_near(const eits_joint *j)
+{
+    for (uint32_t k = 1; k < j->count; ++k) {
+        for (uint32_t i = 0; i < k; ++i) {
+            if (eits_joint_near(&j->shape[i], &j->shape[k], EITS_JOINT_CLEAR_APART))
+                return 1;
+        }
+    }
+    return 0;
+}
+
+/* Whether the shapes need no test: nothing is left of the data, and the frame is far likelier with
+ * each than without. Where `fewer` stand for more discs, less may be left: two that are one leave
+ * little. */
+static int is_clear(const eits_context *ctx, const eits_joint *j, const eits_joint_known *known,
+                    uint32_t fewer)
+{
+    const eits_real excess = eits_joint_excess(ctx, j);
+    if (!(excess < EITS_JOINT_FITTED) ||
+        (fewer > 0 && j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT))
+        return 0;
+    for (uint32_t k = 0; k < j->count; ++k) {
+        if (!(known[k].rise > EITS_JOINT_CLEAR_RISE * excess))
+            return 0;
+    }
+    return 1;
+}
+
+/* Fit the discs of `f` jointly, in *j, those that may be parts of one as one. Returns whether that
+ * needs no test; else j->count is 0 unless *j has the discs as they are, settled. */
+static int fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j, eits_joint_known *known)
+{
+    *j = begin(ctx, f, 0);
+    const uint32_t fewer = eits_joint_merge(j);
+    int clear = 0;
+    if (!any_near(j) && j->count * j->parameters <= EITS_JOINT_PARAMETERS) {
+        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, j);
+        if (explains(ctx, j)) {
+            f->macs += eits_joint_places(ctx, j, known);
+            clear = is_clear(ctx, j, known, fewer) && !any_near(j);
+        }
+        if (clear || fewer == 0)
+            return clear;
+    }
+    j->count = 0;
+    return 0;
+}
+
+int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j)
+{
+    eits_joint_known known[EITS_MAX_TOUCHES];
+    j->count = 0;
+    j->spent = 0;
+    if (!may_fit(ctx, f) || !fit_clearly(ctx, f, j, known))
+        return 0;
+    const eits_real excess = eits_joint_excess(ctx, j);
+    report(ctx, j, known, f);
+    f->tested = 1;
+    for (uint32_t k = 0; k < f->count; ++k) {
+        f->rise[k] = known[k].rise / excess;
+        f->pair[k] = -1;
+        f->confidence[k] = eits_confidence(f->rise[k]);
+    }
+    return 1;
+}
+
+void eits_fit_jointly(eits_context *ctx, eits_fit *f, eits_joint *j)
+{
+    eits_joint_known known[EITS_MAX_TOUCHES];
+    if (!f->tested || !may_fit(ctx, f))
+        return;
+    if (f->changed || j->count == 0) {
+        *j = begin(ctx, f, j->spent);
+        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, j);
+    }
+    if (!explains(ctx, j) || (f->drifts && eits_joint_excess(ctx, j) > EITS_JOINT_FITTED))
+        return;
+    f->macs += eits_joint_evaluate(ctx, j, 1) + eits_joint_places(ctx, j, known);
+    for (uint32_t k = f->count; k < j->count; ++k) /* parts of what was split */
+        inherit(f, j->from[k], k);
+    report(ctx, j, known, f);
+}

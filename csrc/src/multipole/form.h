@@ -1,0 +1,31 @@
+/* One shape: what it makes of the field in which it lies. */
+#ifndef EITSKIN_FORM_H
+#define EITSKIN_FORM_H
+
+#include "multipole/complex.h"
+#include "multipole/multipole.h"
+
+/* binomial(n, (n - k) / 2) for n, k up to EITS_POLE_TERMS, and 2^(1-n). */
+extern const eits_real eits_pole_binomial[EITS_POLE_TERMS + 1][EITS_POLE_TERMS + 1];
+extern const eits_real eits_pole_halves[EITS_POLE_TERMS + 1];
+
+typedef struct eits_form {
+    uint32_t orders;
+    eits_complex turn[EITS_POLE_TERMS]; /* e^(i n phi), n = 1 ... orders */
+    eits_real f2;                       /* a^2 - b^2 */
+    eits_real excess;                   /* contrast - 1 */
+    eits_real tc[EITS_POLE_ORDERS], ts[EITS_POLE_ORDERS];
+    eits_real gap[EITS_POLE_ORDERS]; /* (a+b)^(2n) - (a-b)^(2n) */
+} eits_form;
+
+eits_form eits_form_of(const eits_shape *s, uint32_t orders);
+
+/* out += s a, for complex arrays of `electrodes` numbers (real parts, then imaginary parts). */
+void eits_add_times(eits_real *out, eits_complex s, const eits_real *a, uint32_t electrodes);
+
+/* beta_n of each electrode from the Taylor coefficients `a`, whose n-th term is multiplied by
+ * step(n) and taken from `shift` terms further on (0: the field, 1: its slope by x). */
+void eits_modes(const eits_form *f, const eits_real *a, uint32_t shift, uint32_t electrodes,
+                eits_real *out);
+
+#endif

@@ -1,0 +1,206 @@
+/* What shapes send into each other and into themselves by the rim.
+ *
+ * Each shape lies in a field a_n (multipole.h) and sends out sum_k B_k (z - c)^-k, with B_k a
+ * linear function of conj(a_n). About another shape's middle c_i that is a Taylor series again,
+ *
+ *     (t + s)^-k = sum_q t^(-k-q) binomial(-k, q) s^q,    t = c_i - c_j
+ *
+ * The rim, which no current crosses, mirrors each source: conj(B_k) h(z)^k. For a circle of radius
+ * R h = z / (R^2 - conj(c_j) z). For another outline the nearest piece of the rim counts as
+ * straight, which the model stores as a and b of D = a - b z (docs/reference/eitm-format.md,
+ * "FLDS"); then h = 1 / (b D). Both have h_q = b^(q-1) / D^(q+1) for q > 0. A shape meets its own
+ * image, too. Rounds: in each, every shape sends what the field of the round before makes it send.
+ */
+#include "base/vec.h"
+#include "multipole/constants.h"
+#include "multipole/form.h"
+
+/* B_1 ... B_sent of each electrode from the modes of the field that the shape lies in. */
+static void send(const eits_form *f, const eits_real *mode, uint32_t sent, uint32_t electrodes,
+                 eits_real *out)
+{
+    const size_t width = 2u * (size_t)electrodes;
+    for (uint32_t o = 1; o <= sent; ++o) {
+        eits_real *re = out + width * (o - 1u), *im = re + electrodes;
+        eits_zero(re, width);
+        eits_real power = 1;
+        for (uint32_t q = o;; q -= 2u) {
+            const eits_real *from = mode + width * (q - 1u);
+            const eits_real whole = -(f->excess / 8) * (eits_real)q * f->gap[q - 1u] * power *
+                                    eits_pole_halves[o] * eits_pole_binomial[o][(o - q) / 2u] /
+                                    (eits_real)o;
+            const eits_real c = whole * f->tc[q - 1u], s = -(whole * f->ts[q - 1u]);
+            for (uint32_t e = 0; e < electrodes; ++e) {
+                re[e] = eits_fma(c, from[e], re[e]);
+                im[e] = eits_fma(s, from[electrodes + e], im[e]);
+            }
+            power *= f->f2;
+            if (q < 3u || f->f2 == 0)
+                break;
+        }
+        for (uint32_t e = 0; e < electrodes; ++e) { /* back from the ellipse's frame */
+            const eits_complex b = eits_times((eits_complex){re[e], im[e]}, f->turn[o - 1u]);
+            re[e] = b.re;
+            im[e] = b.im;
+        }
+    }
+}
+
+/* The rim's mirror of a source in slot j, in pixels. */
+typedef struct mirror {
+    eits_complex a, b;
+    eits_complex origin; /* of the model's coordinates, from the grid's lower left corner */
+    eits_complex whole;  /* a in the model's coordinates */
+    int straight;
+} mirror;
+
+static mirror mirror_of(const eits_context *ctx, uint32_t j, const eits_shape *shape)
+{
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm, *stored = ctx->multipole.mirror[j];
+    const eits_pixel at = model->pixel[ctx->multipole.home_pixel[j]];
+    /* the mirror was stored for the home pixel's middle */
+    const eits_complex moved = {shape->x - (eits_real)at.ix - R(0.5),
+                                shape->y - (eits_real)at.iy - R(0.5)};
+    mirror m = {.whole = {stored[0] / pixel, stored[1] / pixel},
+                .b = {stored[2], stored[3]},
+                .origin = {-((eits_real)model->origin_x_mm / pixel),
+                           -((eits_real)model->origin_y_mm / pixel)}};
+    m.straight = eits_fma(m.b.re, m.b.re, m.b.im * m.b.im) > EITS_POLE_STRAIGHT;
+    if (m.straight) {
+        const eits_complex by = eits_times(eits_conjugate(m.b), eits_conjugate(moved));
+        m.whole.re -= by.re;
+        m.whole.im -= by.im;
+    } else {
+        const eits_complex by = eits_times(eits_conjugate(moved), eits_inverse(m.whole));
+        m.b.re += by.re;
+        m.b.im += by.im;
+    }
+    const eits_complex part = eits_times(m.b, m.origin); /* z = z_grid - origin */
+    m.a = (eits_complex){m.whole.re + part.re, m.whole.im + part.im};
+    return m;
+}
+
+/* h_0 ... h_terms about `at`. */
+static void mirror_series(const mirror *m, eits_complex at, uint32_t terms, eits_complex *h)
+{
+    const eits_complex bz = eits_times(m->b, at),
+                       d = eits_inverse((eits_complex){m->a.re - bz.re, m->a.im - bz.im});
+    if (m->straight) {
+        h[0] = eits_times(d, eits_inverse(m->b));
+    } else {
+        const eits_complex z = {at.re - m->origin.re, at.im - m->origin.im};
+        h[0] = eits_times(eits_times(z, d), eits_inverse(m->whole));
+    }
+    eits_complex next = eits_times(d, d);
+    const eits_complex ratio = eits_times(m->b, d);
+    for (uint32_t q = 1; q <= terms; ++q) {
+        h[q] = next;
+        next = eits_times(next, ratio);
+    }
+}
+
+/* The first terms of the product of two series. */
+static void multiply_series(eits_complex *a, const eits_complex *b, uint32_t terms)
+{
+    eits_complex out[EITS_POLE_TERMS + 1];
+    for (uint32_t n = 0; n <= terms; ++n) {
+        out[n] = (eits_complex){0, 0};
+        for (uint32_t m = 0; m <= n; ++m) {
+            const eits_complex part = eits_times(a[m], b[n - m]);
+            out[n].re += part.re;
+            out[n].im += part.im;
+        }
+    }
+    for (uint32_t n = 0; n <= terms; ++n)
+        a[n] = out[n];
+}
+
+/* 1 / (c_i - c_j). Inside each other shapes are no multipoles: nearer than they touch, they are
+ * taken as touching. */
+static eits_complex nearness_of(const eits_shape *i, const eits_shape *j)
+{
+    const eits_complex apart = {i->x - j->x, i->y - j->y};
+    const eits_real square = eits_fma(apart.re, apart.re, apart.im * apart.im),
+                    touching = i->radius + j->radius, least = touching * touching;
+    if (!(square < least))
+        return eits_inverse(apart);
+    if (!(square > R(1e-6) * least))
+        return (eits_complex){0, 0};
+    return eits_scaled(eits_sqrt(square / least), eits_inverse(apart));
+}
+
+/* Add to the field about shape i what shape j sends there, directly and by its image. */
+static uint64_t receive(const eits_context *ctx, const eits_shape *shape, uint32_t i, uint32_t j,
+                        const eits_poles *poles)
+{
+    const uint32_t electrodes = ctx->model->n_electrodes;
+    const size_t width = 2u * (size_t)electrodes;
+    eits_real *to = ctx->multipole.induced + width * EITS_POLE_TERMS * i;
+    const eits_real *from = ctx->multipole.sent + width * EITS_POLE_SENT * j;
+    const eits_complex at = {shape[i].x, shape[i].y};
+    const mirror m = mirror_of(ctx, j, &shape[j]);
+    const eits_complex nearness = nearness_of(&shape[i], &shape[j]);
+    eits_complex h[EITS_POLE_TERMS + 1], image[EITS_POLE_TERMS + 1], direct = {1, 0};
+    const eits_real reach = EITS_POLE_FAR * (shape[i].radius + shape[j].radius);
+    const int far =
+        i != j && eits_fma(nearness.re, nearness.re, nearness.im * nearness.im) * reach * reach < 1;
+    const uint32_t sent_orders = far ? 1u : poles->sent, terms = far ? 3u : poles->orders + 1u;
+    mirror_series(&m, at, terms, h);
+    for (uint32_t q = 0; q <= terms; ++q)
+        image[q] = h[q];
+    for (uint32_t k = 1; k <= sent_orders; ++k) {
+        const eits_real *sent = from + width * (k - 1u);
+        if (k > 1u)
+            multiply_series(image, h, terms);
+        direct = eits_times(direct, nearness);
+        eits_complex term = direct;
+        for (uint32_t q = 1; q <= terms; ++q) {
+            eits_real *re = to + width * (q - 1u), *im = re + electrodes;
+            term =
+                eits_scaled(-((eits_real)(k + q - 1u) / (eits_real)q), eits_times(term, nearness));
+            if (i != j)
+                eits_add_times(re, term, sent, electrodes);
+            for (uint32_t e = 0; e < electrodes; ++e) {
+                const eits_complex part =
+                    eits_times(image[q], (eits_complex){sent[e], -sent[electrodes + e]});
+                re[e] += part.re;
+                im[e] += part.im;
+            }
+        }
+    }
+    return (uint64_t)sent_orders * terms * electrodes * (i == j ? 4u : 8u);
+}
+
+void eits_pole_clear(eits_context *ctx, uint32_t count)
+{
+    eits_zero(ctx->multipole.induced,
+              2u * (size_t)ctx->model->n_electrodes * EITS_POLE_TERMS * count);
+}
+
+uint64_t eits_pole_induced(eits_context *ctx, const eits_shape *shape, uint32_t count,
+                           const eits_poles *poles, uint32_t rounds)
+{
+    const uint32_t electrodes = ctx->model->n_electrodes;
+    const size_t width = 2u * (size_t)electrodes, slot = width * EITS_POLE_TERMS;
+    eits_real *field = ctx->multipole.work, *mode = field + slot;
+    uint64_t macs = 0;
+    for (uint32_t round = 0; round < rounds; ++round) {
+        for (uint32_t i = 0; i < count; ++i) {
+            const eits_form f = eits_form_of(&shape[i], poles->orders);
+            const eits_real *induced = ctx->multipole.induced + slot * i;
+            eits_pole_field(ctx, i, &shape[i], field);
+            for (size_t e = 0; e < width * poles->orders; ++e)
+                field[e] += induced[e];
+            eits_modes(&f, field, 0, electrodes, mode);
+            send(&f, mode, poles->sent, electrodes,
+                 ctx->multipole.sent + width * EITS_POLE_SENT * i);
+        }
+        eits_zero(ctx->multipole.induced, slot * count);
+        for (uint32_t i = 0; i < count; ++i) {
+            for (uint32_t j = 0; j < count; ++j)
+                macs += receive(ctx, shape, i, j, poles);
+        }
+    }
+    return macs + (uint64_t)rounds * electrodes * count * (84u + 12u * poles->orders);
+}

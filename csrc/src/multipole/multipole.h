@@ -1,0 +1,83 @@
+/* The core's model of a touch: a disc or an ellipse of changed conductivity as multipoles in the
+ * electrodes' fields, with what touches do to each other and to their images in the rim.
+ *
+ * In an even sheet the potential of each electrode's current is harmonic: u = Re sum a_n (z - c)^n
+ * about the touch's middle c, z = x + iy. A disc of radius r and contrast k answers order n with an
+ * outgoing term of the same order, so the voltage between a measuring pair changes by
+ *
+ *     dV = - G q pi sum_n n r^(2n) Re(a_n,drive conj a_n,measure),    q = 2 (k - 1) / (k + 1)
+ *
+ * with G = C sigma (C is eits_fields.volts, sigma the sheet's conductivity). An ellipse with half
+ * axes a >= b couples orders; its own modes in cosh coordinates do not couple. With eta =
+ * (a - b) / (a + b), f^2 = a^2 - b^2 and the Taylor coefficients turned into the ellipse's frame,
+ *
+ *     beta_n = sum over k = n, n + 2, ... of a_k f^(k-n) 2^(1-k) binomial(k, (k-n)/2)
+ *     dV = - G (k - 1) sum_n (n pi / 4) [(a+b)^(2n) - (a-b)^(2n)] (t_c Re Re + t_s Im Im)
+ *     t_c, t_s = 2 / [(1 +- eta^n) + k (1 -+ eta^n)]
+ *
+ * where Re Re and Im Im are products of the drive's and the measuring pair's beta_n. The field in
+ * which a touch lies is the electrodes' own field plus what the other touches and all images in the
+ * rim send into it (induced.c). All lengths in this module are in pixels, from the grid's lower
+ * left corner. tests/c/test_multipole.c
+ * compares it with contour integrals, tests/python/acceptance/test_joint_fit.py with boundary
+ * integrals.
+ */
+#ifndef EITSKIN_MULTIPOLE_H
+#define EITSKIN_MULTIPOLE_H
+
+#include "context/context.h"
+
+/* Orders that answer at most. The Taylor series has EITS_POLE_TERMS coefficients a_1, a_2 ... of
+ * each electrode's potential (eitskin/sizes.h): the one more gives slopes by place. At most
+ * EITS_POLE_SENT outgoing orders reach other touches. */
+enum { EITS_POLE_ORDERS = EITS_POLE_TERMS - 1 };
+
+/* A touch as the joint fit varies it. */
+typedef struct eits_shape {
+    eits_real x, y;      /* middle, pixels */
+    eits_real radius;    /* of the disc of equal area, pixels */
+    eits_real amplitude; /* q = 2 (contrast - 1) / (contrast + 1) of a disc */
+    eits_real e1, e2;    /* eta times cos and sin of twice the long axis' angle */
+} eits_shape;
+
+/* How much of the model is used. */
+typedef struct eits_poles {
+    uint32_t orders; /* that answer: 1 to EITS_POLE_ORDERS */
+    uint32_t sent;   /* outgoing orders that reach others: 1 to EITS_POLE_SENT */
+} eits_poles;
+
+/* Whether the model has what this module needs: fields, and data that are differences. */
+int eits_has_poles(const eits_context *ctx);
+
+/* taylor.c: whether a place lies on a kept pixel. */
+int eits_pole_on_skin(const eits_context *ctx, eits_real x, eits_real y);
+
+/* taylor.c: the polynomial of each electrode's field about the pixel nearest to the shape's middle,
+ * by least squares over the pixels around it. It is kept in slot k while the middle stays in that
+ * pixel. Returns the multiply-accumulates, 0 where the kept one serves. */
+uint64_t eits_pole_home(eits_context *ctx, uint32_t k, const eits_shape *shape);
+
+/* a_1 ... a_TERMS at the middle: TERMS x 2 L numbers, the real parts of a term before its imaginary
+ * parts. Slot k must be at home. */
+void eits_pole_field(const eits_context *ctx, uint32_t k, const eits_shape *shape, eits_real *out);
+
+/* induced.c: what comes into each of `count` shapes from the others and from the rim, in
+ * ctx->multipole.induced: `rounds` more of what is there. */
+uint64_t eits_pole_induced(eits_context *ctx, const eits_shape *shape, uint32_t count,
+                           const eits_poles *poles, uint32_t rounds);
+
+/* Nothing is induced: before the first rounds of a frame. */
+void eits_pole_clear(eits_context *ctx, uint32_t count);
+
+/* rows.c: where to put a shape's answer on folds first ... first + count - 1, and its slopes by x,
+ * y, log(radius), amplitude, e1, e2 with the induced field held; a null pointer: not wanted. */
+typedef struct eits_pole_out {
+    eits_real *value;
+    eits_real *slope[6];
+} eits_pole_out;
+
+uint64_t eits_pole_rows(eits_context *ctx, uint32_t k, const eits_shape *shape,
+                        const eits_poles *poles, uint32_t first, uint32_t count,
+                        const eits_pole_out *out);
+
+#endif

@@ -1,0 +1,251 @@
+/* The electrodes' fields about a place, as analytic polynomials.
+ *
+ * Section FLDS stores E_x and E_y of each electrode's current on every pixel. In an even sheet F =
+ * E_x - i E_y is analytic, so a polynomial in z of degree 5 fitted to the pixels within 2.6 of the
+ * home pixel (21 inside the skin, fewer at its rim) gives the field between pixels and its
+ * derivatives. Weights fall with the distance, 1 - (d / 2.6)^2. The least squares use polynomials
+ * that are orthogonal on these pixels (modified Gram-Schmidt, twice for accuracy in float32): the
+ * monomials' normal equations would lose half of the digits where the rim leaves half a circle. */
+#include "multipole/multipole.h"
+
+#include "base/vec.h"
+#include "kernels/column.h"
+#include "multipole/complex.h"
+#include "multipole/constants.h"
+
+enum {
+    DEGREE = EITS_POLE_TERMS - 1, /* of F; the potential has one more */
+    AROUND = 2,                   /* pixels to either side */
+    MAX_POINTS = (2 * AROUND + 1) * (2 * AROUND + 1)
+};
+
+/* sum conj(a_i) b_i */
+static eits_complex inner(const eits_complex *a, const eits_complex *b, uint32_t count)
+{
+    eits_complex sum = {0, 0};
+    for (uint32_t i = 0; i < count; ++i) {
+        sum.re = eits_fma(a[i].re, b[i].re, eits_fma(a[i].im, b[i].im, sum.re));
+        sum.im = eits_fma(a[i].re, b[i].im, eits_fma(-a[i].im, b[i].re, sum.im));
+    }
+    return sum;
+}
+
+/* b -= s a */
+static void subtract(eits_complex *b, eits_complex s, const eits_complex *a, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; ++i) {
+        const eits_complex part = eits_times(s, a[i]);
+        b[i].re -= part.re;
+        b[i].im -= part.im;
+    }
+}
+
+typedef struct points {
+    uint32_t count;
+    uint32_t pixel[MAX_POINTS];
+    eits_real weight[MAX_POINTS];
+    eits_complex z[MAX_POINTS]; /* from the home pixel's middle, over EITS_POLE_UNIT */
+} points;
+
+static uint32_t cell_at(eits_real at, uint32_t count)
+{
+    const eits_real last = (eits_real)(count - 1u);
+    return at > 0 ? (at < last ? (uint32_t)at : count - 1u) : 0;
+}
+
+/* The kept pixel nearest to a place; where its own cell is off the skin, among those around it. */
+static uint32_t home_pixel(const eits_context *ctx, const eits_shape *shape)
+{
+    const eits_model *model = ctx->model;
+    const uint32_t cx = cell_at(shape->x, model->nx), cy = cell_at(shape->y, model->ny);
+    uint32_t best = ctx->cell[(size_t)cy * model->nx + cx];
+    if (best != EITS_NO_PIXEL)
+        return best;
+    eits_real nearest = 0;
+    for (uint32_t reach = 1; best == EITS_NO_PIXEL && reach < model->nx + model->ny; ++reach) {
+        for (uint32_t iy = cy > reach ? cy - reach : 0; iy <= cy + reach && iy < model->ny; ++iy) {
+            for (uint32_t ix = cx > reach ? cx - reach : 0; ix <= cx + reach && ix < model->nx;
+                 ++ix) {
+                const uint32_t j = ctx->cell[(size_t)iy * model->nx + ix];
+                const eits_real dx = (eits_real)ix + R(0.5) - shape->x,
+                                dy = (eits_real)iy + R(0.5) - shape->y,
+                                apart = eits_fma(dx, dx, dy * dy);
+                if (j == EITS_NO_PIXEL || (best != EITS_NO_PIXEL && apart >= nearest))
+                    continue;
+                best = j;
+                nearest = apart;
+            }
+        }
+    }
+    return best;
+}
+
+static points points_around(const eits_context *ctx, uint32_t home)
+{
+    const eits_model *model = ctx->model;
+    const eits_pixel at = model->pixel[home];
+    points p = {.count = 0};
+    for (uint32_t place = 0; place < MAX_POINTS; ++place) {
+        const uint32_t side = 2u * AROUND + 1u, ix = at.ix + place % side - AROUND,
+                       iy = at.iy + place / side - AROUND; /* 0 - 1: none */
+        const eits_real dx = (eits_real)(place % side) - AROUND,
+                        dy = (eits_real)(place / side) - AROUND,
+                        share = eits_fma(dx, dx, dy * dy) / (EITS_POLE_REACH * EITS_POLE_REACH);
+        if (ix >= model->nx || iy >= model->ny || !(share < 1))
+            continue;
+        const uint32_t j = ctx->cell[(size_t)iy * model->nx + ix];
+        if (j == EITS_NO_PIXEL)
+            continue;
+        p.pixel[p.count] = j;
+        p.weight[p.count] = 1 - share;
+        p.z[p.count] = (eits_complex){dx / EITS_POLE_UNIT, dy / EITS_POLE_UNIT};
+        ++p.count;
+    }
+    return p;
+}
+
+/* W V = Q T, Q's columns orthonormal; then the coefficients of F are T^-1 Q* W F. */
+typedef struct basis {
+    uint32_t terms;
+    eits_complex q[EITS_POLE_TERMS][MAX_POINTS];
+    eits_complex t[EITS_POLE_TERMS][EITS_POLE_TERMS];
+} basis;
+
+static void make_basis(const points *p, basis *b)
+{
+    eits_complex power[MAX_POINTS];
+    for (uint32_t i = 0; i < p->count; ++i)
+        power[i] = (eits_complex){p->weight[i], 0};
+    b->terms = 0;
+    for (uint32_t n = 0; n <= DEGREE && n < p->count; ++n) {
+        eits_complex *q = b->q[n];
+        for (uint32_t i = 0; i < p->count; ++i)
+            q[i] = power[i];
+        const eits_real whole = inner(q, q, p->count).re;
+        for (uint32_t m = 0; m <= DEGREE; ++m)
+            b->t[m][n] = (eits_complex){0, 0};
+        for (int pass = 0; pass < 2; ++pass) {
+            for (uint32_t m = 0; m < n; ++m) {
+                const eits_complex s = inner(b->q[m], q, p->count);
+                subtract(q, s, b->q[m], p->count);
+                b->t[m][n].re += s.re;
+                b->t[m][n].im += s.im;
+            }
+        }
+        const eits_real left = inner(q, q, p->count).re;
+        if (!(left > EITS_POLE_DEPENDENT * whole))
+            break;
+        const eits_real norm = eits_sqrt(left);
+        for (uint32_t i = 0; i < p->count; ++i)
+            q[i] = (eits_complex){q[i].re / norm, q[i].im / norm};
+        b->t[n][n] = (eits_complex){norm, 0};
+        b->terms = n + 1;
+        for (uint32_t i = 0; i < p->count; ++i)
+            power[i] = eits_times(power[i], p->z[i]);
+    }
+}
+
+int eits_has_poles(const eits_context *ctx)
+{
+    return ctx->model->fields.at.data != NULL && ctx->model->data_kind == EITS_DATA_DIFFERENCE;
+}
+
+/* Q* W F of all electrodes into `terms`, and the mirror at the home pixel. */
+static void project_fields(eits_context *ctx, const points *p, const basis *b, uint32_t home,
+                           eits_real *terms, eits_real *mirror)
+{
+    const uint32_t electrodes = ctx->model->n_electrodes;
+    eits_real *at = ctx->multipole.work; /* a stored column: E_x, E_y, then the mirror */
+    eits_zero(terms, EITS_POLE_FIELD(electrodes));
+    for (uint32_t i = 0; i < p->count; ++i) {
+        eits_read_column(&ctx->model->fields.at, p->pixel[i], at);
+        if (p->pixel[i] == home)
+            eits_copy(mirror, at + 2u * electrodes, 4);
+        for (uint32_t n = 0; n < b->terms; ++n) {
+            eits_real *re = terms + 2u * (size_t)electrodes * n, *im = re + electrodes;
+            const eits_complex s = {p->weight[i] * b->q[n][i].re, p->weight[i] * b->q[n][i].im};
+            for (uint32_t e = 0; e < electrodes; ++e) { /* conj(s) (E_x - i E_y) */
+                const eits_real x = at[e], y = at[electrodes + e];
+                re[e] = eits_fma(s.re, x, eits_fma(-s.im, y, re[e]));
+                im[e] = eits_fma(-s.re, y, eits_fma(-s.im, x, im[e]));
+            }
+        }
+    }
+}
+
+/* T^-1 of that, from the last term on; then terms are of z and not of z / EITS_POLE_UNIT. */
+static void substitute_back(const basis *b, uint32_t electrodes, eits_real *terms)
+{
+    const size_t width = 2u * (size_t)electrodes;
+    for (uint32_t n = b->terms; n-- > 0;) {
+        eits_real *re = terms + width * n, *im = re + electrodes;
+        for (uint32_t m = n + 1; m < b->terms; ++m) {
+            const eits_complex t = b->t[n][m];
+            const eits_real *from = terms + width * m, *from_im = from + electrodes;
+            for (uint32_t e = 0; e < electrodes; ++e) {
+                re[e] = eits_fma(-t.re, from[e], eits_fma(t.im, from_im[e], re[e]));
+                im[e] = eits_fma(-t.re, from_im[e], eits_fma(-t.im, from[e], im[e]));
+            }
+        }
+        for (uint32_t e = 0; e < width; ++e)
+            re[e] /= b->t[n][n].re;
+    }
+    eits_real unit = 1;
+    for (uint32_t n = 0; n < b->terms; ++n) {
+        for (uint32_t e = 0; e < width; ++e)
+            terms[width * n + e] *= unit;
+        unit /= EITS_POLE_UNIT;
+    }
+}
+
+uint64_t eits_pole_home(eits_context *ctx, uint32_t k, const eits_shape *shape)
+{
+    const uint32_t electrodes = ctx->model->n_electrodes, home = home_pixel(ctx, shape);
+    if (ctx->multipole.home_pixel[k] == home)
+        return 0;
+    const points p = points_around(ctx, home);
+    basis b;
+    make_basis(&p, &b);
+    eits_real *terms = ctx->multipole.home + EITS_POLE_FIELD(electrodes) * k;
+    project_fields(ctx, &p, &b, home, terms, ctx->multipole.mirror[k]);
+    substitute_back(&b, electrodes, terms);
+    ctx->multipole.home_pixel[k] = home;
+    return (uint64_t)electrodes * 4u * b.terms * (p.count + b.terms / 2u) +
+           (uint64_t)8u * p.count * b.terms * b.terms;
+}
+
+int eits_pole_on_skin(const eits_context *ctx, eits_real x, eits_real y)
+{
+    const eits_model *model = ctx->model;
+    if (!(x >= 0 && y >= 0 && x < (eits_real)model->nx && y < (eits_real)model->ny))
+        return 0;
+    return ctx->cell[(size_t)(uint32_t)y * model->nx + (uint32_t)x] != EITS_NO_PIXEL;
+}
+
+void eits_pole_field(const eits_context *ctx, uint32_t k, const eits_shape *shape, eits_real *out)
+{
+    static const eits_real binomial[EITS_POLE_TERMS][EITS_POLE_TERMS] = {
+        {1}, {1, 1}, {1, 2, 1}, {1, 3, 3, 1}, {1, 4, 6, 4, 1}, {1, 5, 10, 10, 5, 1}};
+    const eits_pixel at = ctx->model->pixel[ctx->multipole.home_pixel[k]];
+    const eits_complex d = {shape->x - (eits_real)at.ix - R(0.5),
+                            shape->y - (eits_real)at.iy - R(0.5)};
+    const uint32_t electrodes = ctx->model->n_electrodes, width = 2u * electrodes;
+    const eits_real *terms = ctx->multipole.home + EITS_POLE_FIELD(electrodes) * k;
+    eits_complex power[EITS_POLE_TERMS] = {{1, 0}};
+    for (uint32_t n = 1; n < EITS_POLE_TERMS; ++n)
+        power[n] = eits_times(power[n - 1u], d);
+    for (uint32_t n = 0; n < EITS_POLE_TERMS; ++n) {
+        eits_real *re = out + (size_t)width * n, *im = re + electrodes;
+        const eits_real share = 1 / (eits_real)(n + 1u); /* u is F's integral */
+        eits_zero(re, width);
+        for (uint32_t m = EITS_POLE_TERMS; m-- > n;) { /* the small ones first */
+            const eits_real factor = share * binomial[m][n];
+            const eits_complex s = {factor * power[m - n].re, factor * power[m - n].im};
+            const eits_real *from = terms + (size_t)width * m;
+            for (uint32_t e = 0; e < electrodes; ++e) {
+                re[e] = eits_fma(s.re, from[e], eits_fma(-s.im, from[electrodes + e], re[e]));
+                im[e] = eits_fma(s.re, from[electrodes + e], eits_fma(s.im, from[e], im[e]));
+            }
+        }
+    }
+}
