@@ -1,7 +1,9 @@
-"""``eitskin bench``: what is counted rightly: diagnostics, gestures, touches in other worlds."""
+"""``eitskin bench``: what is counted rightly: diagnostics, gestures, touches in other worlds, and
+touches beside their bound."""
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -156,3 +158,58 @@ def run_worlds(options: argparse.Namespace) -> int:
     text = as_text(scores)
     print(json.dumps([one.as_dict() for one in scores], indent=2) if options.json else text)
     return 0
+
+
+def add_limit(what: Any) -> None:
+    """``bench limit``."""
+    parser = what.add_parser(
+        "limit",
+        help="errors of touches beside the Cramer-Rao bound",
+        description=(
+            "Print the Cramer-Rao bound of a touch's place, the error of the C core and their"
+            " ratio, by place, contrast, SNR, kind of touch and drive pattern. Frames are exact."
+            " Building a model for another pattern takes some minutes."
+        ),
+    )
+    option(parser, "--scenes", "of each set", default=100)
+    option(parser, "--seed", "of all that is random", default=1)
+    option(parser, "--sets NAME,...", "these sets alone (default: all)")
+    option(parser, "--patterns NAME,...", "these drive patterns alone (default: all)")
+    option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
+    option(parser, "--cache DIR", "keeps the exact frames and the models of other patterns", Path)
+    option(parser, "--picture PNG", "draw it", Path)
+    add_page_option(parser, "limit")
+    parser.set_defaults(run=run_limit)
+
+
+def run_limit(options: argparse.Namespace) -> int:
+    """Measure touches beside their bound."""
+    from eitskin.cli.progress import named_bar
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import limit as bench_limit
+    from eitskin_studies.benchmarks import limit_page
+
+    check_within("--scenes", options.scenes, 1, 100_000)
+    check_within("--seed", options.seed, 0, 2**31 - 1)
+    refuse_unwritable(options.page, options.picture)
+    if options.picture is not None:
+        from eitskin.view.panels import check_picture
+
+        check_picture(options.picture)
+    settings = bench_limit.Settings(options.scenes, options.seed, model=options.model)
+    settings = replace(settings, cache=options.cache)
+    if options.sets is not None:
+        settings = replace(settings, sets=tuple(options.sets.split(",")))
+    if options.patterns is not None:
+        settings = replace(settings, patterns=tuple(options.patterns.split(",")))
+    result = bench_limit.run(settings, named_bar)
+    if options.picture is not None:
+        from eitskin_studies.pictures.limit_picture import draw_limit
+
+        draw_limit(options.picture, result)
+    command = f"eitskin bench limit --scenes {options.scenes} --seed {options.seed}"
+    for name in ("sets", "patterns", "model", "picture"):
+        if getattr(options, name) is not None:
+            command += f" --{name} {getattr(options, name)}"
+    filling = limit_page.for_page(result, command)
+    return show(options, result, limit_page.as_text(result), filling, "limit")

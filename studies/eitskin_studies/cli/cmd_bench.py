@@ -1,5 +1,6 @@
 """``eitskin bench WHAT``: speed, side by side in one run: frames, solvers, building, scenes,
-boards, energy, kernels, growth, batches; what diagnostics are worth, and gestures."""
+boards, energy, kernels, growth, batches; the value of diagnostics, gestures, and touches beside
+their bound."""
 
 from typing import Any
 
@@ -26,3 +27,4 @@ def add_parser(subparsers: Any) -> None:
     bench_boards.add_latency(what)
     bench_counts.add_gestures(what)
     bench_counts.add_worlds(what)
+    bench_counts.add_limit(what)

@@ -89,11 +89,13 @@ class WorldScore:
 
 class CoreFinder:
     """Return what ``solver`` finds: a tare on the untouched frames, then the frame, with nothing
-    before it. ``diagnostics`` names what the core finds wrong with the last frame."""
+    before it. ``diagnostics`` names what the core finds wrong with the last frame, and
+    ``touch_macs`` is the cost of its touches in multiply-accumulates."""
 
     def __init__(self, solver: Reconstructor) -> None:
         self.solver, self._own_sign = solver, solver.options.sign
         self.diagnostics: tuple[str, ...] = ()
+        self.touch_macs = 0
 
     def look_for(self, sign: str | None) -> None:
         """Changes of ``sign`` from now on; None: as the solver was reported at first."""
@@ -103,12 +105,13 @@ class CoreFinder:
         self, untouched_v: FloatArray, frame_v: FloatArray, step_v: float
     ) -> tuple[Touch, ...]:
         """As ``Finder``; a board tells its step, too (``BoardInfo.noise_floor_v``)."""
-        self.diagnostics = ()
+        self.diagnostics, self.touch_macs = (), 0
         self.solver.set_options(noise_floor_v=step_v / math.sqrt(12))
         self.solver.tare(untouched_v)
         self.solver.forget()
         result = self.solver.reconstruct(frame_v)
         self.diagnostics = tuple(result.info.diagnostics_by_name)
+        self.touch_macs = result.info.touch_macs
         return result.touches
 
 

@@ -111,7 +111,7 @@ class WorldFactory:
             for k in range(count)
         ]
         exact = self._kept(role, world.errors, drawn, seed, progress)
-        measured = _measured(exact, world, seed, role)
+        measured = measured_frames(exact, world, seed, role)
         scenes = tuple(
             TouchScene(f"{name}-{family}-s{seed}-{k}", touches) for k, touches in enumerate(drawn)
         )
@@ -310,7 +310,7 @@ def _shaped(
     )
 
 
-def _measured(
+def measured_frames(
     exact_v: FloatArray, world: World, seed: int, role: str
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Untouched frames (k, q, m) and touched frames (k, m) with noise and converter, and its steps
