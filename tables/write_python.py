@@ -15,6 +15,7 @@ FORMS = {
     "words": ("tuple[int, int, int, int, int]", "(0, 0, 0, 0, 0)"),
     "electrodes": ("tuple[int, ...]", "()"),
     "stop": ("str", '""'),
+    "shown": ("str", '"solver"'),
     "negated": ("int", "0"),
     "flag": ("bool", "False"),
     "stages": ("dict[str, StageStats]", "{}"),
@@ -222,6 +223,7 @@ def _diagnostics_module(tables: Tables) -> Lines:
     yield from _names(types["eits_diagnostic"], "DIAGNOSTICS")
     yield f"{all_name(types['eits_diagnostic'])} = {_all(types['eits_diagnostic'])}"
     yield from _names(types["eits_stop"], "STOPS")
+    yield from _names(types["eits_shown"], "SHOWN")
     yield from _dataclass(types["eits_info"])
     yield from _dataclass(types["eits_touch"])
 
@@ -290,7 +292,7 @@ def _letters(kind: str) -> str:
     base, count = split_type(kind)
     if base == "eits_stage_stats":
         return f"{4 * count}I"
-    if base in ("char", "u8"):
+    if base == "char" or (base == "u8" and count):
         return f"{count}s"
     return f"{count}{LETTERS[base]}" if count else LETTERS[base]
 

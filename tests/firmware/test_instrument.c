@@ -50,7 +50,7 @@ static void mirror_image(const host_packet *packet)
         head->status != (uint16_t)-status || head->count != b.open.n_pixels ||
         !same_bits(packet->payload + sizeof *head, mirror.ctx->solver.image, 4 * b.open.n_pixels) ||
         head->iterations != info->iterations || head->macs != info->macs ||
-        head->stop != (uint16_t)info->stop || head->masked != info->masked ||
+        head->stop != (uint8_t)info->stop || head->masked != info->masked ||
         !same_bits(&head->residual, &info->residual, 4) ||
         !same_bits(&head->lambda, &info->lambda, 4) ||
         !same_bits(&head->data_norm, &info->data_norm, 4);
@@ -65,7 +65,8 @@ static void mirror_touches(const host_packet *packet)
         CHECK_OK(eits_find_touches(mirror.ctx, touches, EITS_MAX_TOUCHES, &count));
     ++mirror.touches;
     mirror.different +=
-        head->count != count || packet->size != sizeof *head + count * sizeof(eits_packet_touch) ||
+        head->count != count || head->shown != (uint8_t)mirror.ctx->info.shown ||
+        packet->size != sizeof *head + count * sizeof(eits_packet_touch) ||
         !same_bits(packet->payload + sizeof *head, touches, count * sizeof(eits_packet_touch));
     mirror.found_count = count;
 }

@@ -90,6 +90,14 @@ typedef enum eits_stop {
     EITS_STOP_OPTIMUM = 6
 } eits_stop;
 
+/* Which image shows a frame. */
+typedef enum eits_shown {
+    /* the solver's (eits_get_image): there are no touches, or they do not explain the frame */
+    EITS_SHOWN_SOLVER = 0,
+    /* the one that eits_draw_touches makes of the touches: they explain the frame */
+    EITS_SHOWN_TOUCHES = 1
+} eits_shown;
+
 /* The cost of a reconstruction, how it ended, and what was wrong with the frame. */
 typedef struct eits_info {
     /* of the solver */
@@ -143,6 +151,8 @@ typedef struct eits_info {
     /* regularisation of the whitening of this frame, over s_1^2; 0 if the model does not state
      * it */
     eits_real regularisation;
+    /* which image shows the frame; set by eits_find_touches */
+    eits_shown shown;
 } eits_info;
 
 /* One touch. */

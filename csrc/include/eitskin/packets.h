@@ -343,7 +343,9 @@ typedef struct eits_packet_solved {
     /* 0, or minus an eits_status: then the image is zero and there are no touches */
     uint16_t status;
     /* eits_stop */
-    uint16_t stop;
+    uint8_t stop;
+    /* eits_shown; 0 where no touches were looked for */
+    uint8_t shown;
     /* rows left out */
     uint16_t masked;
     /* that the solver took */

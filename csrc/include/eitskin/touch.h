@@ -30,6 +30,17 @@ extern "C" {
 eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t room,
                               uint32_t *count);
 
+/* Draw `count` touches into `image` (n_pixels, S/m): each pixel gets the fraction of it that the
+ * discs and ellipses cover, with a soft edge one pixel wide, times one height for all touches, and
+ * minus that for a touch whose strength is negative. The height is the change that the model
+ * expects of a touch (defaults.touch_change_s_per_m); a model that expects none, as a taught one,
+ * gives the mean change of these touches. Touches that are held without being found in the frame
+ * (`explained` 0) are not drawn. info.shown says whether this image or the solver's shows the
+ * frame. The touches may come from eits_find_touches or from a packet TOUCHES; the same numbers
+ * give the same bits. Errors: EITS_E_ARGUMENT. */
+eits_status eits_draw_touches(const eits_model *model, const eits_touch *touches, uint32_t count,
+                              eits_real *image);
+
 #ifdef __cplusplus
 }
 #endif

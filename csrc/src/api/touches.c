@@ -8,6 +8,7 @@
 #include "eitskin/force.h"
 #include "eitskin/touch.h"
 
+#include "api/constants.h"
 #include "api/stages.h"
 #include "context/context.h"
 #include "context/places.h"
@@ -49,6 +50,20 @@ static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fi
         eits_fit_jointly(ctx, f, &j);
 }
 
+/* Which image shows the frame: the touches' if they explain it and all of them are reported. Where
+ * tracking still hides a touch that was found, the touches' image would lack it. */
+static eits_shown shown(const eits_context *ctx, uint32_t found, const eits_touch *reported,
+                        uint32_t count)
+{
+    const eits_real most =
+        ctx->model->uncertainty.errors != NULL ? EITS_SHOWN_UNEXPLAINED : EITS_SHOWN_UNTESTED;
+    uint32_t drawn = 0;
+    for (uint32_t k = 0; k < count; ++k)
+        drawn += reported[k].explained > 0;
+    return drawn > 0 && drawn == found && ctx->info.unexplained < most ? EITS_SHOWN_TOUCHES
+                                                                       : EITS_SHOWN_SOLVER;
+}
+
 eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t room,
                               uint32_t *count)
 {
@@ -84,6 +99,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
                                             their number is the same */
         eits_reference_tracking_break(ctx);
     ctx->info.touches = reported;
+    ctx->info.shown = shown(ctx, finite, found, reported);
     for (uint32_t k = 0; k < reported; ++k) {
         eits_bring_onto_skin(ctx, &found[k].x_mm, &found[k].y_mm);
         found[k].force_n =

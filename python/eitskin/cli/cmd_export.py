@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
         solver.check_protocol(frames.protocol)
         solver.tare(frames.reference_voltage_v)
         images = np.array(
-            [solver.reconstruct(one, touches=False).image for one in frames.voltage_v], float
+            [solver.reconstruct(one, touches=False).solver_image for one in frames.voltage_v], float
         ).reshape(-1, model.grid.n_pixels)
     nodes, elements = save_eidors(
         options.output,

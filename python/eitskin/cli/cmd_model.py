@@ -320,7 +320,7 @@ def _differences_to_numpy(model: Model, blob: bytes) -> dict[str, float]:
         one = Reconstructor(model, engine=engine, blob=blob)
         one.set_options(solver="fista")
         one.tare(model.golden.reference_v)
-        images[engine] = one.reconstruct(model.golden.frame_v, touches=False).image
+        images[engine] = one.reconstruct(model.golden.frame_v, touches=False).solver_image
     peak = float(np.abs(images["numpy"]).max()) or 1.0
     return {
         name: float(np.abs(images[engine] - images["numpy"]).max()) / peak

@@ -52,11 +52,11 @@ def _touches_text(frame: Frame) -> str:
 
 
 def _image_text(frame: Frame) -> str:
-    if frame.image is None:
+    if frame.solver_image is None:
         return ""
     peak, places_mm = frame.peak, None if frame.has_touches else frame.places_mm
     if peak is None:
-        return f"image of {len(frame.image)} pixels"
+        return f"image of {len(frame.solver_image)} pixels"
     if peak.value == 0:
         return "image: flat"
     x_mm, y_mm = peak.place_mm

@@ -56,7 +56,7 @@ class Rows:
     def _frame(self, frame: Frame) -> list[str]:
         if frame.info is None and frame.raw is None:
             return []
-        more = frame.image is not None or frame.raw is not None
+        more = frame.solver_image is not None or frame.raw is not None
         if self._verbose or more or not frame.has_touches:
             return [line(frame, solver=self._verbose)]
         rows = [] if self._begun else [HEADER + (SCORED if self._scored else "")]

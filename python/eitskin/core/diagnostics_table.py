@@ -18,6 +18,8 @@ DIAGNOSTICS = (
 ALL_DIAGNOSTICS = 511
 # eits_stop: Why the solver stopped.
 STOPS = ("iterations", "gap", "below-threshold", "zero", "diverged", "macs", "optimum")
+# eits_shown: Which image shows a frame.
+SHOWN = ("solver", "touches")
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ class InfoFields:
     noisy_electrodes: tuple[int, ...] = ()  # bit e: electrode e
     # regularisation of the whitening of this frame, over s_1^2; 0 if the model does not state it
     regularisation: float = 0.0
+    shown: str = "solver"  # which image shows the frame; set by eits_find_touches
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from eitskin.arrays import AnyArray, BoolArray, FloatArray
 from eitskin.core.diagnostics import with_diagnostics
-from eitskin.core.diagnostics_table import STOPS, InfoFields, Touch
+from eitskin.core.diagnostics_table import SHOWN, STOPS, InfoFields, Touch
 from eitskin.core.options_table import CHOICES
 from eitskin.core.results import (
     Info,
@@ -255,7 +255,16 @@ class CoreEngine:
             found = tuple(_touch(self._touches[k]) for k in range(self._touch_count[0]))
         coefficients = self.coefficients()
         info = _info(self._info, solved_ns - began_ns, found_ns - solved_ns)
-        return Reconstruction(self._image.copy(), coefficients, found, info)
+        drawn = self._drawn(self._touches, len(found), info)
+        return Reconstruction(self._image.copy(), coefficients, found, info, touch_image=drawn)
+
+    def _drawn(self, touches: Any, count: int, info: Info) -> AnyArray | None:
+        """Return the image of ``count`` touches (n,) if it shows the frame, else None."""
+        if info.shown != "touches":
+            return None
+        image = np.empty(self.n_pixels, dtype=self.dtype)
+        self._lib.eits_draw_touches(self._model, touches, count, self._reals(image))
+        return image
 
     @one_at_a_time
     def follow(self, frames: npt.NDArray[np.floating[Any]]) -> None:
@@ -309,7 +318,9 @@ class CoreEngine:
                 )
                 continue
             each = tuple(_touch(found[room * k + i]) for i in range(r.count))
-            done.append(Reconstruction(images[k], coefficients[k], each, _info(r.info)))
+            info = _info(r.info)
+            drawn = self._drawn(found + room * k, r.count, info) if touches else None
+            done.append(Reconstruction(images[k], coefficients[k], each, info, touch_image=drawn))
         return done
 
     def _reals(self, array: AnyArray) -> Any:
@@ -357,7 +368,7 @@ _TOUCH_NAMES = tuple(one.name for one in fields(Touch))
 
 def _info(i: Any, solve_ns: int = 0, touch_ns: int = 0) -> Info:
     values = {name: getattr(i, name.rstrip("_")) for name in _INFO_NAMES}
-    values["stop"] = STOPS[i.stop]
+    values["stop"], values["shown"] = STOPS[i.stop], SHOWN[i.shown]
     values |= {name: _bits(values[name]) for name in _ELECTRODE_NAMES}
     return Info(**values, solve_us=solve_ns / 1000, touch_us=touch_ns / 1000)
 

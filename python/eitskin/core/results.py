@@ -183,14 +183,36 @@ def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: f
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """The result of one frame: ``image`` (n,) in S/m on the model's pixels, ``coefficients`` (n,),
-    touches with the strongest first, the info, and, if known, the ``model``."""
+    """The result of one frame.
 
-    image: npt.NDArray[np.floating[Any]]
+    Attributes:
+        solver_image: (n,) S/m on the model's pixels, as the solver left it.
+        coefficients: (n,), the same over the column weights.
+        touches: the strongest first.
+        info: cost, end and diagnostics.
+        model: None where it is not known.
+        touch_image: (n,) S/m, the touches as discs and ellipses of one height
+            (``eits_draw_touches``); None where there are none, or where they do not explain the
+            frame.
+    """
+
+    solver_image: npt.NDArray[np.floating[Any]]
     coefficients: npt.NDArray[np.floating[Any]]
     touches: tuple[Touch, ...]
     info: Info
     model: Any = None
+    touch_image: npt.NDArray[np.floating[Any]] | None = None
+
+    @property
+    def image(self) -> npt.NDArray[np.floating[Any]]:
+        """The image that shows the frame, (n,) S/m: ``touch_image`` where the touches explain the
+        frame, else ``solver_image``; ``image_is`` says which of the two."""
+        return self.solver_image if self.touch_image is None else self.touch_image
+
+    @property
+    def image_is(self) -> str:
+        """What ``image`` is: "touches" or "solver"."""
+        return "solver" if self.touch_image is None else "touches"
 
     def __repr__(self) -> str:
         return f"<Reconstruction, touches: {places_text(self.touches)}; {self.info.stop}>"

@@ -49,11 +49,12 @@ class Demo:
 
     @property
     def differences(self) -> dict[str, float]:
-        """The greatest difference between the C core's images and numpy's, relative to the peak."""
-        image = self.results["numpy"].image
+        """The greatest difference between the C core's solver's images and numpy's, relative to the
+        peak."""
+        image = self.results["numpy"].solver_image
         peak = np.abs(image).max() or 1.0
         return {
-            f"{name} to numpy": float(np.abs(self.results[k].image - image).max() / peak)
+            f"{name} to numpy": float(np.abs(self.results[k].solver_image - image).max() / peak)
             for k, name in ENGINE_NAMES.items()
         }
 
@@ -104,6 +105,7 @@ def to_json(demo: Demo) -> dict[str, Any]:
         "false": score.matching.false_touches,
         "position_errors_mm": list(score.matching.distances_mm),
         "miou_image": score.miou_image,
+        "miou_solver": score.miou_solver,
         "miou_touches": score.miou_touches,
         "difference_over_peak": demo.differences,
         "iterations": info.iterations,
@@ -140,6 +142,7 @@ def to_text(demo: Demo) -> str:
     lines += [
         (
             f"{matching.false_touches} false touches; MIoU image {demo.score.miou_image:.3f}, "
+            f"solver's image {demo.score.miou_solver:.3f}, "
             f"touches as discs {demo.score.miou_touches:.3f}"
         ),
         (

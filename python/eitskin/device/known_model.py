@@ -3,8 +3,10 @@ electrodes."""
 
 import zlib
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
+from eitskin.core.drawing import TouchDrawing
 from eitskin.core.results import Options
 from eitskin.device.check import model_of, scanned
 from eitskin.device.wire.packets import BoardInfo
@@ -23,6 +25,11 @@ class KnownModel:
 
     model: Model
     blob: bytes
+
+    @cached_property
+    def drawing(self) -> TouchDrawing:
+        """Draws the touches of packets."""
+        return TouchDrawing(self.blob)
 
 
 def find_model(info: BoardInfo, path: Path | None, name: str) -> KnownModel | None:

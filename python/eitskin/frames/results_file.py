@@ -24,12 +24,15 @@ def save_results(
     touches = [(number, touch) for number in numbers for touch in results[number].touches]
     grid = model.grid
     images = [grid.image(results[number].image) for number in numbers]
+    solved = [grid.image(results[number].solver_image) for number in numbers]
     fields: dict[str, Any] = {
         "format": np.array(FORMAT),
         "version": np.array(VERSION, dtype=np.int32),
         "frame": np.array(numbers, dtype=np.int64),
         "frame_name": np.array([frames.frame_name[number] for number in numbers], dtype=np.str_),
         "image_s_per_m": np.array(images).reshape(len(numbers), grid.ny, grid.nx),
+        "image_is": np.array([results[number].image_is for number in numbers], dtype=np.str_),
+        "solver_image_s_per_m": np.array(solved).reshape(len(numbers), grid.ny, grid.nx),
         "pixel_mm": np.array(grid.pixel_mm),
         "image_origin_mm": np.array(grid.origin_mm),
         "touch_frame": np.array([number for number, _ in touches], dtype=np.int64),

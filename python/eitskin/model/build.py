@@ -297,7 +297,9 @@ def _golden_frame(skin: Skin, linear: Linearisation) -> npt.NDArray[np.float32]:
 def _golden_image(model: Model) -> npt.NDArray[np.float32]:
     core = CoreEngine(encode_model(model), "float32")
     core.set_reference(model.golden.reference_v[None].astype(np.float64))
-    return np.asarray(core.reconstruct(model.golden.frame_v, touches=False).image, dtype=np.float32)
+    return np.asarray(
+        core.reconstruct(model.golden.frame_v, touches=False).solver_image, dtype=np.float32
+    )
 
 
 def _meta(

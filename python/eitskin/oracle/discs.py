@@ -9,6 +9,7 @@ import numpy as np
 
 from eitskin.arrays import ComplexArray, FloatArray
 from eitskin.core.constants_table import NO_DIPOLE_MM2, RADIUS_DEVIATION
+from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
 from eitskin.model.model import Model
@@ -41,6 +42,29 @@ def cover(grid: Grid, x_mm: float, y_mm: float, radius_mm: float) -> FloatArray:
     1."""
     distance = np.linalg.norm(grid.centres_mm() - (x_mm, y_mm), axis=1)
     return np.asarray(np.clip(0.5 + (radius_mm - distance) / grid.pixel_mm, 0.0, 1.0))
+
+
+def drawn(model: Model, touches: Sequence[Touch]) -> FloatArray:
+    """The image of touches that were found, (n,) S/m: what of each pixel they cover, at most all of
+    it, times one height: the expected change, without one the touches' mean. An ellipse's edge is
+    (1 - rho) / |gradient of rho| away, where rho is 1 on it."""
+    grid, expected = model.grid, model.defaults.touch_change_s_per_m
+    covers = np.zeros(grid.n_pixels)
+    for t in touches:
+        offset = grid.centres_mm() - (t.x_mm, t.y_mm)
+        axis = np.array([t.long_x_mm or 0.0, t.long_y_mm or 0.0])
+        a = float(np.linalg.norm(axis)) or t.radius_mm
+        b, along = t.radius_mm**2 / a, axis / a if axis.any() else np.array([1.0, 0.0])
+        u = offset @ along, offset @ (-along[1], along[0])
+        rho = np.hypot(u[0] / a, u[1] / b)
+        slope = np.hypot(u[0] / a**2, u[1] / b**2) / np.maximum(rho, 1e-9)
+        inside = np.where(rho > 1e-6, (1 - rho) / np.maximum(slope, 1e-9), min(a, b))
+        cover = np.clip(0.5 + inside / grid.pixel_mm, 0.0, 1.0)
+        covers = np.clip(covers + np.sign(t.strength_s_per_m_mm2) * cover, -1.0, 1.0)
+    if expected > 0:
+        return covers * expected
+    strength = sum(abs(t.strength_s_per_m_mm2) for t in touches)
+    return covers * (strength / (np.pi * sum(t.radius_mm**2 for t in touches)))
 
 
 def area_mm2(model: Model, disc: Disc) -> float:

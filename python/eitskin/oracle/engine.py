@@ -20,6 +20,7 @@ from eitskin.core.constants_table import (
     MIN_REFERENCE_FRAMES,
     MIN_SQUARE,
     NOISE_ROUNDING,
+    SHOWN_UNTESTED,
 )
 from eitskin.core.diagnostics import with_diagnostics
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
@@ -34,7 +35,7 @@ from eitskin.core.results import (
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
-from eitskin.oracle.discs import Disc, DiscFit, area_mm2, interaction, on_skin
+from eitskin.oracle.discs import Disc, DiscFit, area_mm2, drawn, interaction, on_skin
 from eitskin.oracle.examine import (
     Found,
     crowded,
@@ -291,7 +292,10 @@ class OracleEngine:
             found.bridged_electrodes, found.noisy_electrodes, seen.whitening.regularisation,
             solve_us=(solved_ns - began_ns) / 1000, touch_us=(end_ns - solved_ns) / 1000,
         )  # fmt: skip
-        return Reconstruction(x * weight, x, reported, info)
+        if not reported or unexplained >= SHOWN_UNTESTED:
+            return Reconstruction(x * weight, x, reported, info)
+        info, image = replace(info, shown="touches"), drawn(self.model, reported)
+        return Reconstruction(x * weight, x, reported, info, touch_image=image)
 
     def _threshold(self, ref: Reference, white: Whitening) -> float:
         """lambda_max below which a frame has no touch."""

@@ -31,7 +31,8 @@ def to_text(outcome: ReconstructOutcome) -> str:
             f"compared with the truth of {facts['frames']} frames: {facts['found']} of"
             f" {facts['true']} touches found, {facts['false']} false;"
             + _position_errors(facts)
-            + f" MIoU image {facts['miou_image']:.3f}, touches {facts['miou_touches']:.3f}"
+            + f" MIoU image {facts['miou_image']:.3f}, solver's image"
+            f" {facts['miou_solver']:.3f}, touches {facts['miou_touches']:.3f}"
         )
     return "\n".join(lines)
 
@@ -86,6 +87,7 @@ def summary(scores: dict[int, FrameScore]) -> dict[str, Any]:
         "position_median_mm": float(np.median(distances)) if distances else float("nan"),
         "position_worst_mm": float(np.max(distances)) if distances else float("nan"),
         "miou_image": float(np.mean([score.miou_image for score in scores.values()])),
+        "miou_solver": float(np.mean([score.miou_solver for score in scores.values()])),
         "miou_touches": float(np.mean([score.miou_touches for score in scores.values()])),
     }
 
@@ -124,9 +126,11 @@ def _entry(outcome: ReconstructOutcome, number: int) -> dict[str, Any]:
             found=info.found,
             info=info.as_dict(),
         )
+        entry["image_is"] = result.image_is
     entry["name"] = frames.frame_name[number]
     if number in outcome.scores:
         score = outcome.scores[number]
-        entry["miou_image"], entry["miou_touches"] = score.miou_image, score.miou_touches
+        entry["miou_image"], entry["miou_solver"] = score.miou_image, score.miou_solver
+        entry["miou_touches"] = score.miou_touches
         entry["position_errors_mm"] = list(score.matching.distances_mm)
     return entry

@@ -24,6 +24,7 @@ from eitskin.skin.outline import Outline
 RASTER_MM = 1.5
 LOOKUPS = ("nearest", "bilinear")
 LOOKUP = "bilinear"
+DRAWN_THRESHOLD = 0.48  # t of the image that is drawn of touches: where half of a pixel is covered
 
 
 @dataclass(frozen=True, eq=False)

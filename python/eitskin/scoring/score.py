@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eitskin.arrays import BoolArray
+from eitskin.arrays import AnyArray, BoolArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Reconstruction
 from eitskin.frames.frames import Frames
@@ -16,11 +16,13 @@ from eitskin.skin.skin import size_to_paper
 
 @dataclass(frozen=True)
 class FrameScore:
-    """The score of a frame: the MIoU of the image's mask x > t max(x), interpolated bilinearly,
-    with the model's own t; the MIoU of the touches as discs; and the matching of found and true
-    touches."""
+    """The score of a frame: the MIoU of the mask x > t max(x) of the image that shows it and of the
+    solver's image, interpolated bilinearly; the MIoU of the touches as discs; and the matching of
+    found and true touches. For the solver's image t is the model's own, for drawn touches
+    ``DRAWN_THRESHOLD``."""
 
     miou_image: float
+    miou_solver: float
     miou_touches: float
     matching: Matching
 
@@ -51,19 +53,25 @@ class Scorer:
         truth = self._truth(frames, number, wanted, places)
         if truth is None:
             return None
-        image = np.asarray(result.image, dtype=np.float64)
-        values = np.abs(image) if sign == "both" else image * wanted[0]
-        shown = metrics.touch_mask(
-            self.image_scorer.lookup.show(values), self.model.defaults.mask_threshold
-        )
+        solved = self._miou(result.solver_image, truth, sign, self.model.defaults.mask_threshold)
+        shown = solved
+        if result.touch_image is not None:
+            shown = self._miou(result.touch_image, truth, sign, metrics.DRAWN_THRESHOLD)
         discs = self._discs(result.touches)
         true_mm = np.zeros((0, 2)) if frames.touch_xy_mm is None else frames.touch_xy_mm[places]
         found_mm = [(touch.x_mm, touch.y_mm) for touch in result.touches]
         return FrameScore(
-            metrics.miou(shown, truth),
+            shown,
+            solved,
             metrics.miou(discs, truth),
             match(true_mm, np.array(found_mm), self.gate_mm),
         )
+
+    def _miou(self, image: AnyArray, truth: BoolArray, sign: str, threshold: float) -> float:
+        values = np.asarray(image, dtype=np.float64)
+        values = np.abs(values) if sign == "both" else values * WANTED_SIGNS[sign][0]
+        mask = metrics.touch_mask(self.image_scorer.lookup.show(values), threshold)
+        return float(metrics.miou(mask, truth))
 
     def _discs(self, touches: tuple[Touch, ...]) -> BoolArray:
         centres = np.array([(touch.x_mm, touch.y_mm) for touch in touches]).reshape(-1, 2)

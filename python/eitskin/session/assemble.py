@@ -102,7 +102,7 @@ def _frame(clock: Clock, parts: dict[type, FramePart]) -> Frame:
         clock.elapsed_us(board_us),
         board_us,
         raw=raw,
-        image=None if image is None else image.image,
+        solver_image=None if image is None else image.image,
         touches=() if touches is None else touches.touches,
         has_touches=touches is not None,
         info=None if solved is None else solved.solved,

@@ -104,7 +104,8 @@ class Frame:
         board_us: the same by the board's own clock, which wraps.
         raw: the voltages as the board sent them, each with its quality; None where they were not
             asked for.
-        image: (n,) S/m on the model's pixels; None where it was not asked for.
+        solver_image: (n,) S/m on the model's pixels, as the board's solver left it; None where it
+            was not asked for.
         touches: strongest first; none where touches were not asked for (``has_touches``).
         info: what the solver reports; None where nothing was solved.
         board_events: what the board itself made of its touches; None where it was not asked for.
@@ -123,7 +124,7 @@ class Frame:
     time_us: int
     board_us: int
     raw: RawFrame | None = None
-    image: npt.NDArray[np.float32] | None = None
+    solver_image: npt.NDArray[np.float32] | None = None
     touches: tuple[Touch, ...] = ()
     has_touches: bool = False
     info: Solved | None = None
@@ -168,25 +169,50 @@ class Frame:
         return () if self.info is None else words(self.info)
 
     @cached_property
-    def peak(self) -> ImagePeak | None:
-        """Where the image is strongest; None without an image that was solved, or its model."""
-        if self.image is None or self.known is None or self.refused:
+    def touch_image(self) -> npt.NDArray[np.float32] | None:
+        """The touches as discs and ellipses of one height, (n,) S/m: the bits that the board's core
+        would draw. None where the board says that they do not explain the frame, where it sent no
+        touches, or without its model."""
+        known, info = self.known, self.info
+        if known is None or info is None or info.shown != "touches" or not self.touches:
             return None
-        top = int(np.argmax(np.abs(self.image)))
+        return known.drawing.image(self.touches)
+
+    @property
+    def image(self) -> npt.NDArray[np.float32] | None:
+        """The image that shows the frame, (n,) S/m: ``touch_image``, and where there is none
+        ``solver_image``; None where the frame has neither."""
+        return self.solver_image if self.touch_image is None else self.touch_image
+
+    @property
+    def image_is(self) -> str | None:
+        """What ``image`` is: "touches", "solver", or None."""
+        if self.touch_image is not None:
+            return "touches"
+        return None if self.solver_image is None else "solver"
+
+    @cached_property
+    def peak(self) -> ImagePeak | None:
+        """Where the solver's image is strongest; None where it was not asked for or not solved, or
+        without its model."""
+        if self.solver_image is None or self.known is None or self.refused:
+            return None
+        top = int(np.argmax(np.abs(self.solver_image)))
         x_mm, y_mm = self.known.model.grid.centres_mm()[top]
-        return ImagePeak(float(self.image[top]), (float(x_mm), float(y_mm)))
+        return ImagePeak(float(self.solver_image[top]), (float(x_mm), float(y_mm)))
 
     @cached_property
     def places_mm(self) -> FloatArray | None:
-        """Centroids (k, 2) of what stands out of the image, strongest first (``image_touches``, at
-        the model's threshold for touches); None as ``peak``, or where scipy is not installed."""
+        """Centroids (k, 2) of what stands out of the solver's image, strongest first
+        (``image_touches``, at the model's threshold for touches); None as ``peak``, or where scipy
+        is not installed."""
         if self.peak is None or self.known is None:
             return None
         if self.peak.value == 0:
             return np.zeros((0, 2))
         model = self.known.model
         threshold, sign = model.defaults.touch_threshold, 1 if self.peak.value > 0 else -1
-        values, centres = np.asarray(self.image, np.float64), model.grid.centres_mm()
+        values, centres = np.asarray(self.solver_image, np.float64), model.grid.centres_mm()
         try:
             return touches_in_image(values, model.grid.index, centres, threshold, sign)
         except MissingExtraError:
@@ -220,9 +246,9 @@ class Frame:
         return message | self._truth_facts(message)
 
     def _image_facts(self) -> dict[str, Any]:
-        if self.image is None:
+        if self.solver_image is None or self.image is None:
             return {}
-        facts: dict[str, Any] = {"image_s_per_m": self.image.tolist()}
+        facts: dict[str, Any] = {"image_s_per_m": self.image.tolist(), "image_is": self.image_is}
         facts |= {"peak_s_per_m": None, "peak_mm": None, "places": None}
         if self.peak is not None:
             facts |= {"peak_s_per_m": self.peak.value, "peak_mm": list(self.peak.place_mm)}
@@ -251,7 +277,7 @@ class Frame:
         return {"true": [true_table(t) for t in self.true]}
 
     def __repr__(self) -> str:
-        parts = (("image", self.image), ("raw", self.raw))
+        parts = (("image", self.solver_image), ("raw", self.raw))
         shown = (
             f"refused: {self.refused}"
             if self.refused

@@ -365,7 +365,7 @@ class Session:
             yield Notice("diagnostic", text, self._last_s, now_s)
         events = self._gestures.take(frame)
         if not self.mode & Stream.TOUCHES and frame.has_touches:  # read for the gestures alone
-            info = None if frame.image is None else frame.info
+            info = None if frame.solver_image is None else frame.info
             frame = replace(frame, touches=(), has_touches=False, info=info)
         frame = replace(
             frame, known=self.known, time_unix_s=now_s, arrived_ns=arrived_ns, events=events

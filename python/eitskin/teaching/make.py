@@ -94,5 +94,5 @@ def taught_model(
     )
     core = CoreEngine(encode_model(model), "float32")
     core.set_reference(model.golden.reference_v[None].astype(np.float64))
-    image = core.reconstruct(model.golden.frame_v, touches=False).image
+    image = core.reconstruct(model.golden.frame_v, touches=False).solver_image
     return replace(model, golden=replace(model.golden, image=np.asarray(image, dtype=np.float32)))

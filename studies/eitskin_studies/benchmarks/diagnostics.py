@@ -173,7 +173,7 @@ class _Eye:
         if result is None:
             nothing = metrics.miou(np.zeros_like(truth), truth)
             return _Seen(None, nothing, nothing, 0.0)
-        image = np.asarray(result.image, dtype=np.float64)
+        image = np.asarray(result.solver_image, dtype=np.float64)
         shown = metrics.touch_mask(self._image_scorer.lookup.show(image), self._threshold)
         centres, radii = (
             [(t.x_mm, t.y_mm) for t in result.touches],

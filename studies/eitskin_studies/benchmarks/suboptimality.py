@@ -101,7 +101,7 @@ def _images(engine: CoreEngine, session: Simulated) -> tuple[FloatArray, FloatAr
     for frame in session.frames_v:
         engine.forget()
         result = engine.reconstruct(frame, touches=False)
-        images.append(result.image)
+        images.append(result.solver_image)
         coefficients.append(result.coefficients)
         macs.append(result.info.macs)
     return np.array(images, dtype=np.float64), np.array(coefficients, dtype=np.float64), macs

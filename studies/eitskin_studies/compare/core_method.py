@@ -47,7 +47,7 @@ class CoreMethod:
             FrameError: a frame cannot be used.
         """
         if not self._painted:
-            return np.array([result.image for result in self._solve(dv)], dtype=np.float64)
+            return np.array([result.solver_image for result in self._solve(dv)], dtype=np.float64)
         radii = [[touch.radius_mm for touch in result.touches] for result in self._solve(dv)]
         grid = self._solver.model.grid
         return np.array(

@@ -84,7 +84,7 @@ class Evaluator:
         """t of the mask x > t max(x) with the best mean MIoU of these scenes; for sets of the
         tuning seed."""
         results = reconstruct_many(self.model, frames_v, untouched_v, threads=1, touches=False)
-        images = np.array([one.image for one in results], dtype=np.float64)
+        images = np.array([one.solver_image for one in results], dtype=np.float64)
         return best_threshold(miou_curves(self.image_scorer, images, self.truths(scenes)))
 
     def scores(
@@ -96,7 +96,7 @@ class Evaluator:
         """
         results = reconstruct_many(self.model, frames_v, untouched_v, threads=1)
         truths = self.truths(scenes)
-        images = np.array([one.image for one in results], dtype=np.float64)
+        images = np.array([one.solver_image for one in results], dtype=np.float64)
         scored: dict[str, list[Any]] = {
             "image": miou_curves(self.image_scorer, images, truths, [t])[:, 0]
             .round(DIGITS)

@@ -45,7 +45,7 @@ class SolvedSet:
     @property
     def images(self) -> FloatArray:
         """(k, n) S/m."""
-        return np.array([one.image for one in self.results], dtype=np.float64)
+        return np.array([one.solver_image for one in self.results], dtype=np.float64)
 
 
 def solve_session(

@@ -108,9 +108,9 @@ class LeftOutRows:
         self.reconstructor.reconstruct(frame_v)
         self.reconstructor.forget()
         result = self.reconstructor.reconstruct(frame_v)
-        assert np.isfinite(result.image).all() and result.info.masked == out.sum()
+        assert np.isfinite(result.solver_image).all() and result.info.masked == out.sum()
         assert result.info.gap >= 0 and result.info.step_halvings == 0
-        shown = self.scorer.image_scorer.lookup.show(result.image.astype(np.float64))
+        shown = self.scorer.image_scorer.lookup.show(result.solver_image.astype(np.float64))
         seen, truth = metrics.touch_mask(shown, self.threshold), self.mask(case.scene.touches)
         return metrics.miou(seen, truth), metrics.miou(self.mask(result.touches), truth)
 

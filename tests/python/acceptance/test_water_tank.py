@@ -120,3 +120,14 @@ def test_a_raw_export_in_another_order_and_polarity(folder, shared_data, capsys)
     assert rod["strength_s_per_m_mm2"] > 0
     assert np.hypot(rod["x_mm"], rod["y_mm"]) / (DIAMETER_MM / 2) == pytest.approx(0.58, abs=0.06)
     assert abs(np.degrees(np.arctan2(rod["x_mm"], rod["y_mm"]))) < 6
+
+
+def test_the_shown_image_of_a_tank_is_better_than_the_solvers(folder, capsys):
+    """Nine frames with conducting and resistive objects, some of them wide. The model does not
+    state its errors, so touches may leave more of the data than in simulated scenes."""
+    facts = reconstructed(folder, "kit4.npz", capsys, "--sign", "both")
+    assert [frame["image_is"] for frame in facts["frames"]] == ["touches"] * 9
+    better = [frame["miou_image"] > frame["miou_solver"] for frame in facts["frames"]]
+    assert all(better)
+    assert facts["summary"]["miou_image"] >= 0.85
+    assert facts["summary"]["miou_image"] >= facts["summary"]["miou_solver"] + 0.15

@@ -49,7 +49,7 @@ def raw(frame: int, flags: int) -> bytes:
 
 def solved(count: int) -> Solved:
     return Solved(
-        1, 2, 3, 4, 5, count, 0, "iterations", 0, 6, 7, 8, 9, 1.0, 2.0, 3.0, 0.1, 0.2, 0.3
+        1, 2, 3, 4, 5, count, 0, "iterations", "solver", 0, 6, 7, 8, 9, 1.0, 2.0, 3.0, 0.1, 0.2, 0.3
     )
 
 

@@ -28,13 +28,13 @@ INFO = {
     "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs",
     "lambda", "lambda_max",
     "lambda_noise", "gap", "gap_rel", "residual", "data_norm", "solve_us", "touch_us",
-    "diagnostics", "found", "saturated", "outliers", "model_mismatch", "unexplained",
+    "diagnostics", "found", "saturated", "outliers", "model_mismatch", "unexplained", "shown",
     "regularisation",
     "open_electrodes", "bridged_electrodes", "noisy_electrodes",
 }  # fmt: skip
 SUMMARY = {
     "frames", "found", "true", "false", "position_median_mm", "position_worst_mm", "miou_image",
-    "miou_touches",
+    "miou_solver", "miou_touches",
 }  # fmt: skip
 
 

@@ -151,7 +151,27 @@ def test_a_recording_of_link_version_1_is_refused_by_a_line(tmp_path):
 
 def solved(frame: int, **found: object) -> Frame:
     head = Solved(
-        frame, 0, 0, 0, 0, 0, 0, "gap", 0, 1, 1, 1, 1, 0.1, 0.2, 0.0, 0.0, 0.0, 1.0, **found
+        frame,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        "gap",
+        "solver",
+        0,
+        1,
+        1,
+        1,
+        1,
+        0.1,
+        0.2,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+        **found,
     )
     return Frame(frame, 0, 0, has_touches=True, info=head)
 

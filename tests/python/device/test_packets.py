@@ -25,7 +25,7 @@ LAYOUTS = {
     for kind in base.__subclasses__()
     if hasattr(kind, "LAYOUT")
 }
-PLACES = {"c": 1, "s": 1, "H": 2, "I": 4, "i": 4, "f": 4, "Q": 8}
+PLACES = {"B": 1, "c": 1, "s": 1, "H": 2, "I": 4, "i": 4, "f": 4, "Q": 8}
 
 
 def places(layout: struct.Struct) -> list[tuple[int, int]]:
@@ -153,8 +153,8 @@ def test_raw_frames_are_read_bit_for_bit(rows, frame, time, scan, flags):
 
 
 def solved(count: int, status: int = 0) -> pk.Solved:
-    return pk.Solved(7, 8, 9, 10, 11, count, status, "gap", 3, 20, 40, 1234, 56, 0.5, 1.5, 0.25,
-        0.125, 2.0, 4.0,
+    return pk.Solved(7, 8, 9, 10, 11, count, status, "gap", "touches", 3, 20, 40, 1234, 56, 0.5,
+        1.5, 0.25, 0.125, 2.0, 4.0,
                      0b10111111, 3, 2, 0.375, (5, 63), (0, 1), (7,))  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from device_helpers import FRAMES, UNTOUCHED, frames, of, raw_frames, sim_board, sim_device
 
+from eitskin.core.drawing import TouchDrawing
 from eitskin.device.known_model import board_options
 from eitskin.device.wire import link_table as cmd
 from eitskin.device.wire.link_table import FaultCode, Quality, ReplyStatus, Stream
@@ -33,11 +34,14 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit():
     assert len(raws) == len(images) == len(touches) == FRAMES
     assert [type(item) for item in items[:3]] == [RawFrame, SolvedImage, SolvedTouches]
     skin = Reconstructor(model, blob=blob, options=board_options(model, board))
+    drawing = TouchDrawing(blob)
     skin.tare(np.array([raw.voltage_v for raw in untouched]))
     for raw, image, found in zip(raws, images, touches, strict=True):
         result = skin.reconstruct(raw.voltage_v)
-        assert image.image.tobytes() == result.image.astype(np.float32).tobytes()
+        assert image.image.tobytes() == result.solver_image.astype(np.float32).tobytes()
         assert found.touches == result.touches
+        assert found.solved.shown == result.image_is == "touches" and result.touch_image is not None
+        assert drawing.image(found.touches).tobytes() == result.touch_image.tobytes()
         assert image.solved.iterations == found.solved.iterations == result.info.iterations
         assert found.solved.macs == result.info.macs
         assert raw.frame == image.frame == found.frame

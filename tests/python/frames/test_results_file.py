@@ -15,6 +15,7 @@ from small_models import prebuilt, session
 
 FIELDS = {
     "format", "version", "frame", "frame_name", "image_s_per_m", "pixel_mm", "image_origin_mm",
+    "image_is", "solver_image_s_per_m",
     "touch_frame", "touch_id",
     "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_explained",
     "touch_force_n", "touch_confidence", "touch_place_mm2", "touch_long_mm", "info",
@@ -39,13 +40,16 @@ def test_every_field(tmp_path, results):
     assert (str(saved["format"]), int(saved["version"])) == ("eitskin-results", 2)
     assert saved["frame"].tolist() == [0, 2, 9]
     assert saved["frame_name"].tolist() == ["test-s3-0", "test-s3-2", "test-s3-9"]
-    assert saved["image_s_per_m"].shape == (3, 32, 32)
+    assert saved["image_s_per_m"].shape == saved["solver_image_s_per_m"].shape == (3, 32, 32)
+    assert saved["image_is"].tolist() == [results[number].image_is for number in (0, 2, 9)]
     for place, number in enumerate((0, 2, 9)):
         image = saved["image_s_per_m"][place]
         assert (
             image[model.grid.index[:, 1], model.grid.index[:, 0]] == results[number].image
         ).all()
         assert np.isnan(image).sum() == 32 * 32 - 812
+        solved = model.grid.values(saved["solver_image_s_per_m"][place])
+        assert (solved == results[number].solver_image).all()
     assert float(saved["pixel_mm"]) == pytest.approx(194 / 32)
     assert saved["image_origin_mm"] == pytest.approx([-97, -97])
     touches = [(number, touch) for number in (0, 2, 9) for touch in results[number].touches]

@@ -71,7 +71,7 @@ def test_golden_frame_of_every_storage_and_data_kind(storage, data_kind):
         engine = Reconstructor(model, engine=name, blob=blob)
         engine.set_options(solver="fista")
         engine.tare(model.golden.reference_v)
-        images.append(engine.reconstruct(model.golden.frame_v, touches=False).image)
+        images.append(engine.reconstruct(model.golden.frame_v, touches=False).solver_image)
     assert np.abs(images[0] - images[1]).max() < 1e-9 * np.abs(images[1]).max()
 
 
@@ -123,7 +123,9 @@ def images_of(model: Model) -> np.ndarray:
     reconstructor.tare(golden.reference_v)
     shifts = (0, 39, 104)  # the same touches turned by three and by eight electrodes
     frames = [golden.reference_v + np.roll(change, shift) for shift in shifts]
-    return np.array([reconstructor.reconstruct(frame, touches=False).image for frame in frames])
+    return np.array(
+        [reconstructor.reconstruct(frame, touches=False).solver_image for frame in frames]
+    )
 
 
 def test_the_prebuilt_model_is_what_the_builder_makes():

@@ -18,7 +18,7 @@ for engine in ("c", "c64", "numpy"):
     noise = 1e-4 * np.random.default_rng(1).normal(size=(16, 208))
     baseline = reconstructor.tare(model.golden.reference_v + noise)
     result = reconstructor.reconstruct(model.golden.frame_v)
-    facts[engine] = [baseline.correlation, float(result.image.max()), len(result.touches)]
+    facts[engine] = [baseline.correlation, float(result.solver_image.max()), len(result.touches)]
 extras = ("scipy", "netgen", "matplotlib", "sklearn")
 facts["loaded"] = sorted(name for name, module in sys.modules.items()
                          if name.split(".")[0] in extras and module is not None)

@@ -172,7 +172,9 @@ def test_what_the_working_set_costs():
         results.append([core.reconstruct(frame, touches=False) for frame in frames])
     images, above = [], []
     for every, some in zip(*results, strict=True):
-        images.append(np.abs(every.image - some.image).max() / np.abs(every.image).max())
+        images.append(
+            np.abs(every.solver_image - some.solver_image).max() / np.abs(every.solver_image).max()
+        )
         costs = [
             r.info.residual**2 / 2 + r.info.lambda_ * np.abs(r.coefficients).sum()
             for r in (every, some)

@@ -62,7 +62,7 @@ def without(electrodes: list[int], frame: np.ndarray) -> np.ndarray:
 
 def off(results: dict[str, Reconstruction], name: str) -> float:
     """The greatest difference to the oracle's image over its peak."""
-    mine, expected = results[name].image, results["numpy"].image
+    mine, expected = results[name].solver_image, results["numpy"].solver_image
     assert np.abs(expected).max() > 0
     return float(np.abs(mine - expected).max() / np.abs(expected).max())
 
@@ -133,7 +133,9 @@ def test_reciprocals_that_are_measured_the_other_way_round(data_kind):
     frames[1, model.fold.first[::2]] = np.nan
     frames[2, model.fold.second[1::2]] = np.nan
     agree(made, frames, EXACT, "increase")
-    whole, first, second = (made["numpy"].reconstruct(f, touches=False).image for f in frames)
+    whole, first, second = (
+        made["numpy"].reconstruct(f, touches=False).solver_image for f in frames
+    )
     assert whole.any() and first.any() and second.any()
 
 
@@ -286,7 +288,7 @@ def test_images_from_a_warm_start(data_kind):
                 with pytest.raises(FrameError):
                     one.reconstruct(np.zeros(208))
         results = made.reconstruct(frame, touches=False)
-        if results["numpy"].image.any():
+        if results["numpy"].solver_image.any():
             assert off(results, "c64") <= 1e-10 and off(results, "c") <= 3e-4
         assert len({one.info.stop for one in results.values()}) == 1
 
@@ -313,7 +315,7 @@ def test_recovery_from_a_step_too_long(factor, halvings, solver, engine):
         assert result.info.stop == "iterations"
         assert p.gap(result.coefficients.astype(float)) < 0.01 * p.gap(np.zeros(p.s.shape[1]))
     else:
-        assert result.info.stop == "diverged" and not result.image.any()
+        assert result.info.stop == "diverged" and not result.solver_image.any()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -329,7 +331,7 @@ def test_a_frame_does_not_depend_on_those_before(engine):
     images: dict[int, np.ndarray] = {}
     for order in ((0, 1, 2, 3), (3, 2, 1, 0), (3, 1, 0, 2)):
         for k in order:
-            image = made.reconstruct(frames[k], touches=False).image
+            image = made.reconstruct(frames[k], touches=False).solver_image
             assert (images.setdefault(k, image) == image).all(), (order, k)
 
 
@@ -345,7 +347,7 @@ def test_a_row_masked_at_the_reference_stays_out_until_the_next(engine):
     made.mask_rows(np.zeros(208, dtype=bool))
     still = made.reconstruct(frame, touches=False)
     assert masked.info.masked == still.info.masked == 6
-    assert (masked.image == still.image).all()
+    assert (masked.solver_image == still.solver_image).all()
     made.tare(s.untouched(1, 8))
     assert made.reconstruct(frame, touches=False).info.masked == 0
 
@@ -360,6 +362,6 @@ def test_the_engine_numpy_has_no_memory_and_counts_no_work():
         one.tare(session().untouched_v)
     for frame in frames:
         ours, theirs = plain.reconstruct(frame), tracked.reconstruct(frame)
-        assert ours.touches == theirs.touches and (ours.image == theirs.image).all()
+        assert ours.touches == theirs.touches and (ours.solver_image == theirs.solver_image).all()
         assert [touch.id for touch in ours.touches] == [*range(1, 1 + len(ours.touches))]
         assert replace(ours.info, macs=0, touch_macs=0) == ours.info

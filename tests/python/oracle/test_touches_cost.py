@@ -127,7 +127,7 @@ def test_the_best_fit_is_scipys():
     for frame in frames_v[:4]:
         seen = oracle.explain(frame)
         fit = oracle.disc_fit(seen)
-        image = oracle.reconstruct(frame, touches=False).image
+        image = oracle.reconstruct(frame, touches=False).solver_image
         discs = fit.with_strengths(fit.peaks(image))
         scale = np.tile([1.0, 1.0, 1.0, 0.01], len(discs))
 

@@ -18,7 +18,26 @@ from eitskin.session.frame import Frame
 from small_models import prebuilt
 
 SOLVED = Solved(
-    7, 1000, 900, 100, 20, 0, 0, "iterations", 0, 60, 30, 1, 1, 0.1, 0.2, 0.0, 0.01, 0.0, 1.0
+    7,
+    1000,
+    900,
+    100,
+    20,
+    0,
+    0,
+    "iterations",
+    "solver",
+    0,
+    60,
+    30,
+    1,
+    1,
+    0.1,
+    0.2,
+    0.0,
+    0.01,
+    0.0,
+    1.0,
 )
 
 
@@ -32,7 +51,7 @@ def image(*places: tuple[float, float], sign: float = 1.0) -> Frame:
     centres = prebuilt()[0].grid.centres_mm()
     near = (np.linalg.norm(centres - place, axis=1) < 10 for place in places)
     values = (0.01 * sign * sum(near, np.zeros(len(centres)))).astype(np.float32)
-    return Frame(7, 0, 1000, image=values, info=SOLVED, known=known())
+    return Frame(7, 0, 1000, solver_image=values, info=SOLVED, known=known())
 
 
 def known() -> KnownModel:

@@ -72,7 +72,8 @@ def together(seconds: float, *works: Callable[[], object]) -> list[int]:
 
 def key(result: Reconstruction) -> bytes:
     places = [(t.x_mm, t.y_mm, t.radius_mm, t.strength_s_per_m_mm2) for t in result.touches]
-    return result.image.tobytes() + result.coefficients.tobytes() + np.array(places).tobytes()
+    arrays = result.solver_image, result.coefficients, np.array(places)
+    return b"".join(one.tobytes() for one in arrays)
 
 
 # ---- objects that reach the C core ----

@@ -31,7 +31,7 @@ def built(blob: bytes, width: str) -> list[CoreEngine]:
 def same(results: list[Reconstruction]) -> None:
     first = results[0]
     for other in results[1:]:
-        assert (other.image == first.image).all()
+        assert (other.solver_image == first.solver_image).all()
         assert (other.coefficients == first.coefficients).all()
         assert other.touches == first.touches
         assert other.info == first.info
@@ -56,7 +56,7 @@ def test_small_models(solver, storage, data_kind, width):
             results.append([engine.reconstruct(frame) for frame in frames])
         for of_builds in zip(*results, strict=True):
             same(list(of_builds))
-        assert np.abs(results[0][0].image).max() > 0
+        assert np.abs(results[0][0].solver_image).max() > 0
 
 
 @pytest.mark.parametrize("width", ["float32", "float64"])
@@ -71,7 +71,7 @@ def test_a_noisy_tare(solver, width):
         results = [engine.reconstruct(frame) for engine in engines]
         same(results)
         assert results[0].info.regularisation == pytest.approx(0.05, rel=0.1)
-        assert results[0].image.any()
+        assert results[0].solver_image.any()
 
 
 @pytest.mark.parametrize("width", ["float32", "float64"])

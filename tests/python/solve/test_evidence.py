@@ -229,9 +229,9 @@ def test_switched_off_it_is_as_if_the_model_did_not_say_what_it_may_be_wrong_by(
         one(engine, untouched_v, frame_v, **OFF),
         one(engine, untouched_v, frame_v, errors=False, **OFF),
     ):
-        assert (result.image == plain.image).all() and result.touches == plain.touches
+        assert (result.solver_image == plain.solver_image).all() and result.touches == plain.touches
     both = one(engine, untouched_v, frame_v)
-    assert not (both.image == plain.image).all()  # by the row gains
+    assert not (both.solver_image == plain.solver_image).all()  # by the row gains
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -239,13 +239,14 @@ def test_row_gains_can_be_switched_after_the_tare(engine):
     """At once, without another tare, and back."""
     scenes = world("uneven_20_percent")
     expected = [
-        one(engine, scenes.untouched_v[0], scenes.frames_v[0], row_gains=on).image for on in (0, 1)
+        one(engine, scenes.untouched_v[0], scenes.frames_v[0], row_gains=on).solver_image
+        for on in (0, 1)
     ]
     reconstructor = made(engine)
     reconstructor.tare(scenes.untouched_v[0])
     for on in (0, 1, 0):
         reconstructor.set_options(row_gains=on)
-        image = reconstructor.reconstruct(scenes.frames_v[0]).image
+        image = reconstructor.reconstruct(scenes.frames_v[0]).solver_image
         assert np.abs(image - expected[on]).max() <= 1e-6 * np.abs(image).max()
     assert np.abs(expected[0] - expected[1]).max() > 0.01 * np.abs(expected[1]).max()
 
@@ -293,7 +294,7 @@ def test_row_gains_undo_what_multiplies_rows(engine):
             one(engine, factors * untouched_v, factors * frame_v, row_gains=on, touch_test=0)
             for on in (1, 0)
         )
-        assert (with_.image == without.image).all()
+        assert (with_.solver_image == without.solver_image).all()
         assert with_.info.regularisation == pytest.approx(1.0)
         assert "unlike the model" in with_.info.diagnostics_by_name
         tested = one(engine, factors * untouched_v, factors * frame_v)

@@ -104,10 +104,10 @@ def test_a_reference_must_be_whole(engine, value):
 
 def test_a_refused_single_reference_leaves_the_old_one(engine):
     reconstructor, frame = made(engine), session().frames_v[0]
-    before = reconstructor.reconstruct(frame).image
+    before = reconstructor.reconstruct(frame).solver_image
     with pytest.raises(FrameError):
         reconstructor.tare(np.zeros(208))
-    assert (reconstructor.reconstruct(frame).image == before).all()
+    assert (reconstructor.reconstruct(frame).solver_image == before).all()
 
 
 def test_a_refused_series_leaves_no_reference(engine):
@@ -147,11 +147,11 @@ def test_saturated_channels_are_left_out(engine):
     assert reconstructor.reconstruct(damaged).info.outliers == 3
     reconstructor.set_options(diagnostics=0)
     spoilt = reconstructor.reconstruct(damaged)
-    assert np.abs(spoilt.image - whole.image).max() > whole.image.max()
+    assert np.abs(spoilt.solver_image - whole.solver_image).max() > whole.solver_image.max()
     reconstructor.set_options(saturation_v=limit)
     saved = reconstructor.reconstruct(damaged)
     assert saved.info.masked == 3
-    assert np.abs(saved.image - whole.image).max() < 0.1 * whole.image.max()
+    assert np.abs(saved.solver_image - whole.solver_image).max() < 0.1 * whole.solver_image.max()
     for before in (0, 1, 7):
         with pytest.raises(FrameError, match=f"reference frame {before} .* row 3 .* saturated"):
             reconstructor.tare(np.vstack([session().untouched_v[:before], damaged]))
@@ -174,10 +174,10 @@ def test_no_change_gives_no_touch(engine):
     # numpy's mean of the untouched frames is this very frame; the core's differs from it by
     # rounding
     assert result.info.stop in ("below-threshold", "zero")
-    assert result.touches == () and not result.image.any()
+    assert result.touches == () and not result.solver_image.any()
     reconstructor.tare(session().exact_untouched_v)
     result = reconstructor.reconstruct(session().exact_untouched_v)
-    assert result.info.stop == "zero" and result.touches == () and not result.image.any()
+    assert result.info.stop == "zero" and result.touches == () and not result.solver_image.any()
     assert result.info.nonzeros == result.info.iterations == 0
 
 
@@ -305,7 +305,7 @@ def test_from_a_file(engine, tmp_path):
     path.write_bytes(small_blob())
     reconstructor = Reconstructor.from_file(path, engine=engine)
     reconstructor.tare(small().linear.v0_v)
-    image = reconstructor.reconstruct(small().frames(1, 1)[0]).image
+    image = reconstructor.reconstruct(small().frames(1, 1)[0]).solver_image
     assert image.shape == (small_model().grid.n_pixels,)
     path.write_bytes(small_blob()[:-1])
     with pytest.raises(ModelError, match="truncated"):
@@ -323,20 +323,20 @@ def test_results_do_not_change_afterwards():
     """Images are copies: the next frame does not write into them."""
     reconstructor = made()
     first = reconstructor.reconstruct(session().frames_v[0])
-    kept = first.image.copy()
+    kept = first.solver_image.copy()
     reconstructor.reconstruct(session().frames_v[1])
-    assert (first.image == kept).all()
-    assert first.image.dtype == np.float32
-    assert made("c64").reconstruct(session().frames_v[0]).image.dtype == np.float64
+    assert (first.solver_image == kept).all()
+    assert first.solver_image.dtype == np.float32
+    assert made("c64").reconstruct(session().frames_v[0]).solver_image.dtype == np.float64
 
 
 def test_two_reconstructors_share_nothing():
     a, b = made(), made()
     a.set_options(sign="both", iterations=3)
     assert b.options.iterations == 60
-    alone = b.reconstruct(session().frames_v[0]).image
+    alone = b.reconstruct(session().frames_v[0]).solver_image
     a.reconstruct(session().frames_v[1])
-    assert (b.reconstruct(session().frames_v[0]).image == alone).all()
+    assert (b.reconstruct(session().frames_v[0]).solver_image == alone).all()
 
 
 def test_the_reference_counts_no_macs():

@@ -135,7 +135,7 @@ def test_a_resistive_change_is_a_touch_of_negative_strength():
         if expected:
             assert np.sign(touches[0].strength_s_per_m_mm2) == expected
             assert np.hypot(touches[0].x_mm - x, touches[0].y_mm - y) < 0.5
-            assert made.reconstruct(frame).image.min() < 0
+            assert made.reconstruct(frame).solver_image.min() < 0
         else:
             assert all(t.strength_s_per_m_mm2 > 0 for t in touches)
-            assert made.reconstruct(frame).image.min() == 0
+            assert made.reconstruct(frame).solver_image.min() == 0

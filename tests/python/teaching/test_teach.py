@@ -99,7 +99,7 @@ def test_the_file_brings_its_own_options_and_every_engine_agrees(taught):
             variances[engine] += [
                 [t.x_variance_mm2, t.xy_covariance_mm2, t.y_variance_mm2] for t in result.touches
             ]
-    images = {engine: result.image for engine, result in made.items()}
+    images = {engine: result.solver_image for engine, result in made.items()}
     size = images["numpy"].max()
     assert images["c64"] == pytest.approx(images["numpy"], abs=1e-9 * size)
     for c32, c64 in zip(found["c"], found["c64"], strict=True):
@@ -129,8 +129,8 @@ def test_a_row_left_out_is_filled_in_by_every_engine_alike(taught):
             cores.tare(judged.untouched[i])
             found = cores.reconstruct(judged.pressed[i])
             if not i:
-                image = found["numpy"].image
-                assert found["c64"].image == pytest.approx(image, abs=1e-6 * image.max())
+                image = found["numpy"].solver_image
+                assert found["c64"].solver_image == pytest.approx(image, abs=1e-6 * image.max())
             touches = found["c"].touches[:1]
             at = [(one.x_mm, one.y_mm) for one in touches] or [(2 * RADIUS_MM, 0.0)]
             errors.append(float(np.linalg.norm(at[0] - judged.place_mm[i])))

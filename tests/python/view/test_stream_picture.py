@@ -11,7 +11,26 @@ from small_models import prebuilt
 
 PNG = b"\x89PNG\r\n\x1a\n"
 SOLVED = Solved(
-    7, 1000, 900, 100, 20, 0, 0, "iterations", 0, 60, 30, 1, 1, 0.1, 0.2, 0.0, 0.01, 0.0, 1.0
+    7,
+    1000,
+    900,
+    100,
+    20,
+    0,
+    0,
+    "iterations",
+    "solver",
+    0,
+    60,
+    30,
+    1,
+    1,
+    0.1,
+    0.2,
+    0.0,
+    0.01,
+    0.0,
+    1.0,
 )
 
 
@@ -19,7 +38,7 @@ def seen(number: int) -> Frame:
     values = np.zeros(812, dtype=np.float32)
     values[number % 812] = 1.0
     true = (TrueTouch(0.0, 0.0, 9.0, 5.0),)
-    return Frame(number, 1000 * number, 0, image=values, info=SOLVED, true=true)
+    return Frame(number, 1000 * number, 0, solver_image=values, info=SOLVED, true=true)
 
 
 def album(count: int) -> Album:

@@ -23,8 +23,9 @@ I32 = Annotated[int, "i", ""]
 Negated = Annotated[int, "H", "negated"]
 One = Annotated[int, "H", "one"]
 Pair = Annotated[tuple[int, int], "2i", "pair"]
+Shown = Annotated[str, "B", "shown"]
 Stages = Annotated[dict[str, "StageStats"], "24I", "stages"]
-Stop = Annotated[str, "H", "stop"]
+Stop = Annotated[str, "B", "stop"]
 Text16 = Annotated[str, "16s", "text"]
 Text24 = Annotated[str, "24s", "text"]
 U16 = Annotated[int, "H", ""]
@@ -250,6 +251,7 @@ class SolvedPacket(Payload, c="eits_packet_solved"):
     count: U16  # pixels or touches that follow
     status: Negated  # 0, or minus an eits_status: then the image is zero and there are no touches
     stop: Stop  # eits_stop
+    shown: Shown  # eits_shown; 0 where no touches were looked for
     masked: U16  # rows left out
     iterations: U32  # that the solver took
     nonzeros: U32  # coefficients that are not zero

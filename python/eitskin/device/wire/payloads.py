@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from eitskin.core.diagnostics_table import STOPS
+from eitskin.core.diagnostics_table import SHOWN, STOPS
 from eitskin.core.gestures import GestureEvent
 from eitskin.core.gestures_table import EventKind, EventPhase
 from eitskin.core.results import known_touch
@@ -67,6 +67,12 @@ def _read_stop(values: Sequence[Any]) -> str:
     return STOPS[values[0]]
 
 
+def _read_shown(values: Sequence[Any]) -> str:
+    if values[0] >= len(SHOWN):
+        raise MalformedPacket(f"shown {values[0]} is not known")
+    return SHOWN[values[0]]
+
+
 def _read_stages(values: Sequence[Any]) -> dict[str, StageStats]:
     return {name: StageStats(*values[4 * k : 4 * k + 4]) for k, name in enumerate(STAGES)}
 
@@ -81,6 +87,7 @@ FORMS = {
     "words": Form(tuple, tuple),
     "electrodes": Form(_read_electrodes, lambda bits: (sum(1 << bit for bit in bits),)),
     "stop": Form(_read_stop, lambda name: (STOPS.index(name),)),
+    "shown": Form(_read_shown, lambda name: (SHOWN.index(name),)),
     "negated": Form(lambda values: -values[0], lambda value: (-value,)),
     "flag": Form(lambda values: bool(values[0]), lambda value: (int(value),)),
     "stages": Form(

@@ -180,9 +180,9 @@ class HostTwin:
         assert frame.info is not None
         options, difference = self._core.options, 1.0
         same = frame.refused is None and same_diagnostics(result.info, raw, frame.info, options)
-        if same and frame.image is not None:
-            same = same_bits(result.image, frame.image)
-            difference = _difference(result.image, frame.image)
+        if same and frame.solver_image is not None:
+            same = same_bits(result.solver_image, frame.solver_image)
+            difference = _difference(result.solver_image, frame.solver_image)
         touched = not frame.has_touches or same_touches(result.touches, frame.touches)
         touched = self._same_events(frame) and touched
         from_before = self._from_before or (same and not touched and self._tracks)
@@ -207,7 +207,7 @@ class HostTwin:
         check = self.check
         if same:
             check.same += 1
-            check.images += frame.image is not None
+            check.images += frame.solver_image is not None
             check.touches += frame.has_touches
         elif self._sure or not from_before:
             check.different.append(frame.number)

@@ -198,7 +198,7 @@ def _bits(one: Solved) -> str:
     if isinstance(one, FrameError):
         return str(one)
     info = {name: value for name, value in vars(one.info).items() if not name.endswith("_us")}
-    arrays = hashlib.sha256(one.image.tobytes() + one.coefficients.tobytes()).hexdigest()
+    arrays = hashlib.sha256(one.solver_image.tobytes() + one.coefficients.tobytes()).hexdigest()
     return f"{arrays} {one.touches!r} {info!r}"
 
 
@@ -224,7 +224,7 @@ class Judge:
         mask = metrics.disc_mask(self._points, truth.centres_mm(), truth.radii_mm())
         shown = np.zeros_like(mask)
         if one is not None:
-            image = np.asarray(one.image, dtype=np.float64)
+            image = np.asarray(one.solver_image, dtype=np.float64)
             image = np.abs(image) if sign == "both" else -image if sign == "decrease" else image
             shown = metrics.touch_mask(self._scorer.lookup.show(image), self._threshold)
         places = np.array([(t.x_mm, t.y_mm) for t in found]).reshape(-1, 2)

@@ -79,7 +79,9 @@ def tuned(
             truths = evaluator.truths(scenes)
             results = reconstruct_many(evaluator.model, frames_v, untouched_v, threads=1)
             curves = miou_curves(
-                image_scorer, np.array([one.image for one in results], dtype=np.float64), truths
+                image_scorer,
+                np.array([one.solver_image for one in results], dtype=np.float64),
+                truths,
             )
             t = best_threshold(curves)
             discs = [

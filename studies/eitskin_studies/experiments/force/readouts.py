@@ -92,7 +92,7 @@ class Instruments:
                 if isinstance(result, Reconstruction)
             ]
             assert len(results) == len(frames)
-            images = np.array([result.image for result in results], dtype=np.float64)
+            images = np.array([result.solver_image for result in results], dtype=np.float64)
             places = centres[np.abs(images).argmax(axis=1)]
             solve = float(np.mean([result.info.macs for result in results]))
             both = solve + float(np.mean([result.info.touch_macs for result in results]))

@@ -134,7 +134,7 @@ class AblationRuns:
         )
         return miou_curves(
             image_scorer,
-            np.array([one.image for one in results], dtype=np.float64),
+            np.array([one.solver_image for one in results], dtype=np.float64),
             session.truths(self._raster),
         )
 

@@ -182,7 +182,8 @@ class CoreImager:
         macs = float(np.mean([one.info.macs + one.info.touch_macs for one in results]))
         if not self._painted:
             return Shown(
-                np.array([one.image for one in results], dtype=np.float64) @ self._paint.T, macs
+                np.array([one.solver_image for one in results], dtype=np.float64) @ self._paint.T,
+                macs,
             )
         touches = tuple(one.touches for one in results)
         return Shown(np.array([painted_touches(self._grid, one) for one in touches]), macs, touches)
