@@ -58,6 +58,7 @@ def stream(
     record: str | Path | None = None,
     zones: str | Path | None = None,
     speed: float = 0.0,
+    name: str | None = None,
     **solver: Any,
 ) -> Iterator[Frame]:
     """A skin's frames as they come, touches and all; the board is set up first, its reference taken
@@ -76,6 +77,7 @@ def stream(
         record: a new recording of every packet.
         zones: a file of named places, whose presses are reported (docs/guide/gestures.md).
         speed: of what is simulated, emulated or recorded; 1 is as it was, 0 as fast as it can.
+        name: of the board, skin or source in every message (None: the URL's, or a serial number).
         solver: ``sign``, ``iterations``, ``track`` and what else SolverSettings has.
 
     Raises:
@@ -83,8 +85,9 @@ def stream(
             opened.
     """
     frames_of = _stream(
-        url, mode, model, frames, every, tare, preset, to, record, zones, speed, solver
-    )
+        url, mode, model, frames, every, tare, preset, to, record, zones, speed, name,
+        solver,
+    )  # fmt: skip
     return OneThreadAtATime(frames_of, f"the stream of {url}", "a board has one reader at a time")
 
 
@@ -100,6 +103,7 @@ def _stream(
     record: str | Path | None,
     zones: str | Path | None,
     speed: float,
+    name: str | None,
     solver: dict[str, Any],
 ) -> Generator[Frame, None, None]:
     settings = SessionSettings(
@@ -113,6 +117,7 @@ def _stream(
         tare=tare,
         record=None if record is None else Path(record),
         zones=() if zones is None else load_zones(zones),
+        name=name,
     )
     with (
         Session(url, settings, speed=speed, observe=observe_scene) as session,

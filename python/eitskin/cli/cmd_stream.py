@@ -6,6 +6,7 @@ import argparse
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.device_options import (
     add_device,
+    add_name,
     add_outputs,
     add_scan,
     add_stream,
@@ -37,6 +38,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(parser, "--overwrite", "overwrite existing files of --record and --to")
     add_zones(parser)
     add_outputs(parser)
+    add_name(parser)
     add_verbose(parser)
     add_scan(parser)
     parser.set_defaults(run=run)

@@ -13,6 +13,7 @@ from eitskin.cli.arguments import option
 from eitskin.cli.device_options import (
     add_device,
     add_every,
+    add_name,
     add_outputs,
     add_report,
     add_scan,
@@ -71,6 +72,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     option(parser, "--skin SKIN.toml", "skin for --teach (default: the board model's)", Path)
     add_outputs(parser)
+    add_name(parser)
     add_zones(parser)
     option(parser, "--overwrite", "overwrite existing files of --to")
     option(parser, "--open", "open the page in this machine's browser")

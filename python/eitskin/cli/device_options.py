@@ -15,6 +15,7 @@ from eitskin.core.options_table import SOLVERS
 from eitskin.device.client import TARE_FRAMES, Device, check_tare_frames
 from eitskin.device.open import open_with_files
 from eitskin.device.settings import ScanSettings, SolverSettings
+from eitskin.device.timing import check_name
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
@@ -180,6 +181,16 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_name(parser: argparse.ArgumentParser) -> None:
+    """Add ``--name``."""
+    option(
+        parser,
+        "--name NAME",
+        "name of this board, skin or source in messages, topics, frames and the TUIO source"
+        " (default: name=NAME in the device's URL, else the board's serial number)",
+    )
+
+
 def named_outputs(options: argparse.Namespace, session: Session) -> AbstractContextManager[Outputs]:
     """Return a context with the open sinks of ``--to``, attached to ``session``."""
     overwrite = getattr(options, "overwrite", False)
@@ -296,4 +307,11 @@ def session_settings(
         tare=None if options.tare is None else check_tare_frames(options.tare),
         zones=read_zones(getattr(options, "zones", None)),
         record=record,
+        name=read_name(options),
     )
+
+
+def read_name(options: argparse.Namespace) -> str | None:
+    """Return ``--name``, checked; None if it is not given."""
+    name: str | None = getattr(options, "name", None)
+    return None if name is None else check_name(name, "--name")

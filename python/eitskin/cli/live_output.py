@@ -145,7 +145,7 @@ def _print_summary(options: argparse.Namespace, session: Session, outputs: Outpu
         if counts:
             facts["sinks"] = counts
     if options.json:
-        print(encoded(summary_message(facts)))
+        print(encoded(summary_message(facts, session.source)))
         return
     lines = summary.lines() + ([] if outputs is None else outputs.lines)
     lines += [] if observer is None else observer.lines()

@@ -14,7 +14,7 @@ from eitskin.device.link import Reconnect
 from eitskin.device.pacing import Pacer
 from eitskin.device.ports import BAUD, Port, SerialTransport, only_board, ports
 from eitskin.device.source import open_source, source_schemes
-from eitskin.device.timing import split_timing
+from eitskin.device.timing import split_name, split_timing
 from eitskin.device.transport import Transport
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import EitskinError, UsageError, missing_checkout
@@ -104,6 +104,7 @@ def open_with_files(
 
 def open_transport(url: str, *, model: bytes | None = None, image: Path | None = None) -> Transport:
     """The bare bytes behind ``url``; raises as ``open_device``."""
+    url, _ = split_name(url)
     bare, timing = split_timing(url)
     scheme, colon, rest = bare.partition(":")
     brought = scheme not in SCHEMES and scheme in source_schemes()

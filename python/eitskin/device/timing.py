@@ -1,6 +1,7 @@
 """URLs' ``?speed=1&loop=1``: when simulated, emulated and recorded frames are given on."""
 
 import math
+import re
 from dataclasses import dataclass
 
 from eitskin.config import plain_number
@@ -19,9 +20,41 @@ class Timing:
     loop: bool = False
 
 
+def split_name(url: str) -> tuple[str, str | None]:
+    """A device's URL without ``name=NAME`` after '?', and that name; None where it has none.
+
+    Raises:
+        UsageError: the name cannot be used.
+    """
+    bare, mark, query = url.rpartition("?")
+    pairs = query.split("&") if mark else []
+    names = [pair.removeprefix("name=") for pair in pairs if pair.startswith("name=")]
+    if not names:
+        return url, None
+    if len(names) > 1:
+        raise UsageError(f"device {url!r}: has two names; leave one out")
+    rest = "&".join(pair for pair in pairs if not pair.startswith("name="))
+    return bare + ("?" + rest if rest else ""), check_name(names[0], f"device {url!r}")
+
+
+def check_name(name: str, where: str) -> str:
+    """``name`` of a board, skin or source, which becomes a part of topics and addresses.
+
+    Raises:
+        UsageError: it has other characters, or too many.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", name):
+        raise UsageError(
+            f"{where}: name {name!r} cannot be used; use 1 to 32 letters, digits, - and _, as in"
+            " left-arm"
+        )
+    return name
+
+
 def split_timing(url: str) -> tuple[str, Timing]:
     """A device's URL without what follows '?', and what that asks for. URLs of other schemes than
-    sim, emu and file stay as they are."""
+    sim, emu and file stay as they are, but for a name."""
+    url = split_name(url)[0]
     scheme, _, _ = url.partition(":")
     bare, mark, query = url.rpartition("?")
     if scheme not in TIMED or not mark:

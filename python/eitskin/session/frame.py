@@ -37,6 +37,7 @@ class Notice:
     time_s: float | None
     time_unix_s: float | None = None
     cause: Fault | LinkEvent | None = field(default=None, repr=False)
+    source: str | None = None
 
     def message(self) -> dict[str, Any]:
         facts = asdict(self)
@@ -59,6 +60,7 @@ class DriveReport:
     board_us: int
     packet: DriveTouches
     time_unix_s: float | None = None
+    source: str | None = None
 
     @property
     def time_s(self) -> float:
@@ -83,7 +85,8 @@ class DriveReport:
     def message(self) -> dict[str, Any]:
         times = (self.time_s, self.time_unix_s)
         message = report_table(self.frame, self.drive, *times, self.touches)
-        return message | {"board_us": self.board_us, "age_us": self.packet.head.age_us}
+        message |= {"board_us": self.board_us, "age_us": self.packet.head.age_us}
+        return message | {"source": self.source}
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +102,7 @@ class Frame:
     """One frame with everything that is known about it.
 
     Attributes:
+        source: the name of the board, skin or source; None: of a file.
         number: the board's count, from 0, and again from 0 after 2^32.
         time_us: when its scan began, from the first frame of the stream; it does not wrap.
         board_us: the same by the board's own clock, which wraps.
@@ -136,6 +140,7 @@ class Frame:
     true: tuple[TrueTouch, ...] | None = None
     errors_mm: dict[int, float] | None = None
     notices: tuple[Notice, ...] = ()
+    source: str | None = None
 
     @property
     def time_s(self) -> float:
@@ -240,7 +245,7 @@ class Frame:
             events=[event.as_dict() | {"time_s": self.time_s} for event in self.events],
             info=None if self.info is None else self.info.as_dict(),
         )
-        message["board_us"] = self.board_us
+        message["board_us"], message["source"] = self.board_us, self.source
         if arrays:
             message |= self._image_facts() | self._raw_facts()
         return message | self._truth_facts(message)

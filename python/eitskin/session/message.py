@@ -110,6 +110,6 @@ def true_table(touch: TrueTouch) -> dict[str, float]:
     }
 
 
-def summary_message(facts: dict[str, Any]) -> dict[str, Any]:
+def summary_message(facts: dict[str, Any], source: str | None = None) -> dict[str, Any]:
     """Return the message with a session's summary."""
-    return head("summary") | {"summary": facts}
+    return head("summary") | {"summary": facts, "source": source}

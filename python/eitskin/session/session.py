@@ -25,7 +25,7 @@ from eitskin.device.pacing import Pacer, Slowness, WallClock
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.streaming import LEAVE_S, STOP_S, packet_stream
-from eitskin.device.timing import check_speed, split_timing
+from eitskin.device.timing import check_name, check_speed, split_name, split_timing
 from eitskin.device.transport import Capabilities
 from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.session.assemble import Assembler, Clock
@@ -65,6 +65,7 @@ class Session:
     while the board is unplugged.
 
     Attributes:
+        given_name: the name of the source that the settings or the URL give; None: none.
         device, known: the board and its model, where the host has that.
         mode: what is streamed.
         observer: who adds to frames what is known of them; None: nobody.
@@ -94,6 +95,9 @@ class Session:
     ) -> None:
         self.url, self.settings, self._say = url, settings or SessionSettings(), say
         self._progress, self._observe = progress, observe
+        self.given_name = split_name(url)[1]
+        if self.settings.name is not None:
+            self.given_name = check_name(self.settings.name, "name")
         named = split_timing(url)[1]
         self._loops = named.loop
         chosen = check_speed(speed, "speed") if named.speed is None else named.speed
@@ -151,6 +155,11 @@ class Session:
     def name(self) -> str:
         """The board, in a word or two."""
         return self.device.transport.name
+
+    @property
+    def source(self) -> str:
+        """The name of the source in every message: as given, else the board's serial number."""
+        return self.given_name or self.device.board.serial
 
     @property
     def capabilities(self) -> Capabilities:
@@ -349,9 +358,9 @@ class Session:
         self.summary.add(message)
         if isinstance(message, Notice):
             if self._novelty.lines(message):
-                yield replace(message, time_s=self._last_s, time_unix_s=now_s)
+                yield replace(message, time_s=self._last_s, time_unix_s=now_s, source=self.source)
         elif isinstance(message, DriveReport):
-            yield replace(message, time_unix_s=now_s)
+            yield replace(message, time_unix_s=now_s, source=self.source)
         else:
             yield from self._seen_frame(message, now_s)
 
@@ -362,14 +371,15 @@ class Session:
             for text in self._slowness.lines(frame.time_us):
                 self._progress(text)
         for text in self._novelty.lines(frame):
-            yield Notice("diagnostic", text, self._last_s, now_s)
+            yield Notice("diagnostic", text, self._last_s, now_s, source=self.source)
         events = self._gestures.take(frame)
         if not self.mode & Stream.TOUCHES and frame.has_touches:  # read for the gestures alone
             info = None if frame.solver_image is None else frame.info
             frame = replace(frame, touches=(), has_touches=False, info=info)
         frame = replace(
-            frame, known=self.known, time_unix_s=now_s, arrived_ns=arrived_ns, events=events
-        )
+            frame, known=self.known, time_unix_s=now_s, arrived_ns=arrived_ns, events=events,
+            source=self.source,
+        )  # fmt: skip
         yield frame if self.observer is None else self.observer.see(frame)
 
     def _over(self, frame: Frame) -> bool:

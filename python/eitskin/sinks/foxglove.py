@@ -12,7 +12,7 @@ import numpy as np
 
 from eitskin.errors import SinkError, missing_extra
 from eitskin.session.message import schema
-from eitskin.sinks.mcap_file import FRAME_ID
+from eitskin.sinks.mcap_file import frame_id, topics_of
 from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
 
 USAGE = "foxglove: or foxglove://HOST:PORT"
@@ -36,13 +36,14 @@ class FoxgloveSink:
             from foxglove.messages import RawImage, Timestamp
         except ImportError:
             raise missing_extra("foxglove", "foxglove-sdk") from None
+        self._frame_id = frame_id(source)
         self._image, self._time, self._model = RawImage, Timestamp, source.model
         self._context = context = foxglove.Context()  # closing it closes its channels
         described = schema()
         defined = {"$defs": described["$defs"]}
         channels = {
             name: foxglove.Channel(
-                topic,
+                topics_of(source) + topic,
                 schema={"title": f"eitskin.{name}", **described["$defs"][name], **defined},
                 message_encoding="json",
                 context=context,
@@ -50,9 +51,9 @@ class FoxgloveSink:
             for name, topic in TOPICS.items()
         }
         self._channels: dict[str, Any] = channels
-        self._pictures = RawImageChannel("/image", context=context)
+        self._pictures = RawImageChannel(topics_of(source) + "/image", context=context)
         self._server = foxglove.start_server(
-            name=f"eitskin {source.url}",
+            name=f"eitskin {source.name or source.url}",
             host=host,
             port=port,
             context=context,
@@ -79,7 +80,7 @@ class FoxgloveSink:
             self._pictures.log(
                 self._image(
                     timestamp=self._time(now // 10**9, now % 10**9),
-                    frame_id=FRAME_ID,
+                    frame_id=self._frame_id,
                     width=width,
                     height=height,
                     encoding="32FC1",

@@ -88,7 +88,7 @@ def open_sink(url: str, source: TouchSource) -> Sink:
     if "LSLAPICFG" not in os.environ:
         set_config_content(QUIET)
     try:
-        return LslSink(name or "eitskin", source, touches)
+        return LslSink(name or source.name or "eitskin", source, touches)
     except Exception as error:
         raise SinkError(
             f"--to {url}: liblsl opened no outlet ({error}); try another name"

@@ -1,5 +1,6 @@
 """``mqtt://[USER:PASSWORD@]HOST[:1883][/topic]``: publish each message to topic/frame,
-topic/report, topic/notice or topic/summary of a broker. The default topic is eitskin."""
+topic/report, topic/notice or topic/summary of a broker. The default topic is eitskin, or
+eitskin/NAME of a board, skin or source that has a name."""
 
 import threading
 from typing import Any
@@ -98,4 +99,5 @@ def open_sink(url: str, source: TouchSource) -> Sink:
         client.loop_stop()
         why = refused[0] if refused else "no answer"
         raise SinkError(f"--to {shown}: the broker refuses ({why}); check user and password")
-    return MqttSink(client, parts.path.strip("/") or "eitskin")
+    default = "eitskin" if source.name is None else f"eitskin/{source.name}"
+    return MqttSink(client, parts.path.strip("/") or default)

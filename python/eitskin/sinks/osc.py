@@ -85,4 +85,5 @@ def open_sink(url: str, source: TouchSource) -> Sink:
     parts, host, port = address(url, None, usage=USAGE)
     nothing_more(url, parts, USAGE, path=True)
     need_osc("osc")
-    return OscSink(connected(url, host, port), parts.path.rstrip("/") or "/eitskin")
+    default = "/eitskin" if source.name is None else f"/eitskin/{source.name}"
+    return OscSink(connected(url, host, port), parts.path.rstrip("/") or default)

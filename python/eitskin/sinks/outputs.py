@@ -70,6 +70,7 @@ class Outputs:
         room: int = ROOM,
     ) -> None:
         self._queues: list[Queue] = []
+        self._source = source.source
         self._patience_s = PATIENCE_S if patient else 0.0
         try:
             for url in urls:
@@ -92,7 +93,7 @@ class Outputs:
     def end(self, facts: dict[str, Any]) -> list[dict[str, Any]]:
         """Give ``facts``, the summary, to every sink, close them all, and return their counts."""
         if self._queues:
-            outgoing = OutgoingMessage(summary_message(facts))
+            outgoing = OutgoingMessage(summary_message(facts, self._source))
             for one in self._queues:
                 one.put(outgoing, self._patience_s)
         self.close()
@@ -134,7 +135,8 @@ def attached_outputs(
     message. Raises the errors of ``Outputs``."""
     model = None if session.known is None else session.known.model
     board = session.device.board.board
-    source = TouchSource(session.device.transport.url, board, model, overwrite)
+    url, name = session.device.transport.url, session.given_name
+    source = TouchSource(url, board, model, overwrite, name, session.source)
     with Outputs(urls, source, patient=session.patient, say=say) as outputs:
         session.consumers.append(outputs.put)
         yield outputs

@@ -25,12 +25,15 @@ class Dropped(Exception):
 @dataclass(frozen=True, eq=False)
 class TouchSource:
     """The origin of touches: the device's URL, its board, and its model if the host has it.
-    ``overwrite`` allows overwriting existing files."""
+    ``overwrite`` allows overwriting existing files. ``name`` is the source's name as given, None
+    where none was, and ``source`` the one in messages, which is then the board's serial number."""
 
     url: str
     board: str = ""
     model: Model | None = None
     overwrite: bool = False
+    name: str | None = None
+    source: str | None = None
 
     @property
     def box_mm(self) -> Box | None:

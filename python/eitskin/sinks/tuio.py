@@ -2,21 +2,25 @@
 
 Each frame gives a bundle: source, alive with all ids, a set per touch, and fseq. x and y of a set
 are relative to the skin's bounding box, 0 to 1, y downwards as TUIO defines it; the speed is in
-boxes per second, the acceleration in boxes per second squared. With ``--report drive`` each drive
-gives a bundle with its ids and speeds. A frame without reports after it, and the end of the stream,
-give a bundle without touches.
+boxes per second, the acceleration in boxes per second squared. The source is NAME@HOST, where NAME
+is the path of ``tuio://HOST/NAME``, else the name of the board, skin or source, else eitskin with
+the board's serial number and the number of this process, so that two skins are two sources. With
+``--report drive`` each drive gives a bundle with its ids and speeds. A frame without reports after
+it, and the end of the stream, give a bundle without touches.
 """
 
 import math
+import os
 import socket
 from typing import Any
 
+from eitskin.device.timing import check_name
 from eitskin.errors import SinkError
 from eitskin.sinks.osc import bundle, need_osc
 from eitskin.sinks.sink import Box, OutgoingMessage, Sink, TouchSource, address, nothing_more
 from eitskin.sinks.udp import connected, send
 
-USAGE = "tuio://HOST or tuio://HOST:PORT"
+USAGE = "tuio://HOST, tuio://HOST:PORT or tuio://HOST/NAME"
 PORT = 3333
 PATH = "/tuio/2Dcur"
 State = tuple[float, float, float, float, float]  # x, y, their speeds, the acceleration
@@ -100,12 +104,16 @@ class TuioSink:
 
 def open_sink(url: str, source: TouchSource) -> Sink:
     parts, host, port = address(url, PORT, usage=USAGE)
-    nothing_more(url, parts, USAGE)
+    nothing_more(url, parts, USAGE, path=True)
+    named = parts.path.strip("/") or source.name
     need_osc("tuio")
     if source.box_mm is None:
         raise SinkError(
             f"--to {url}: TUIO needs the skin's bounding box, which is in the board's model; name"
             " its file with  --model FILE"
         )
-    name = f"eitskin@{socket.gethostname()}"
+    if parts.path.strip("/"):
+        check_name(parts.path.strip("/"), f"--to {url}")
+    own = f"eitskin-{source.source or source.board or 'board'}-{os.getpid()}"
+    name = f"{named or own}@{socket.gethostname()}"
     return TuioSink(connected(url, host, port), Cursors(source.box_mm, name))

@@ -149,7 +149,7 @@ def test_tuio(swipe, osc):
                 bundle["set"].append(values)
             else:
                 bundle[kind] = values
-        assert bundle["fseq"] == [number] and bundle["source"][0].startswith("eitskin@")
+        assert bundle["fseq"] == [number] and bundle["source"][0].startswith("eitskin-simulated-")
         assert bundle["alive"] == [t.id for t in touches] == [one[0] for one in bundle["set"]]
         for touch, (_, x, y, speed_x, *_) in zip(touches, bundle["set"], strict=True):
             place = (x0 + x * (x1 - x0), y1 - y * (y1 - y0))
