@@ -124,8 +124,9 @@ static void change_options(void)
     o.warm_start = hand_draw(&fingers, 8) != 0;
     o.project_reference = hand_draw(&fingers, 8) != 0;
     o.mac_limit = hand_draw(&fingers, 4) ? 0 : 200000 + hand_draw(&fingers, 1000000);
-    o.touch_fit =
-        hand_draw(&fingers, 2) ? EITS_TOUCH_FIT_ALL : hand_draw(&fingers, EITS_TOUCH_FIT_ALL + 1);
+    o.touch_fit = hand_draw(&fingers, 2)
+                      ? EITS_TOUCH_FIT_ALL
+                      : hand_draw(&fingers, EITS_TOUCH_FIT_ALL + 1) & EITS_TOUCH_FIT_ALL;
     o.second_pass = hand_draw(&fingers, 3) == 0;
     o.saturation_v = 100 * fingers.rms;
     set_options(run.ctx, o);
