@@ -18,7 +18,7 @@ from bytes_damage import ODD_BYTES, ODD_WORDS, read_or_refuse
 from test_bytes_descriptions import DISK, SCENE, SKIN
 from test_bytes_drawings import CURVES, FOREARM, HAND
 from test_bytes_frames import FIELDS, ODD_ARRAYS
-from test_bytes_models import WHOLE, resealed
+from test_bytes_models import resealed, whole_models
 
 from eitskin.core.engine import CoreEngine
 from eitskin.frames.frames import load_frames
@@ -206,7 +206,7 @@ FORMATS: dict[str, tuple[str, Make, Callable[[Path], None]]] = {
     "svg": ("a.svg", lambda draw: damaged(draw, [CURVES, HAND]), read_shapes),
     "dxf": ("a.dxf", lambda draw: damaged(draw, [FOREARM]), read_shapes),
     "frames": ("a.npz", lambda draw: archive(draw, FIELDS), read_frames),
-    "eitm": ("a.eitm", lambda draw: resealed(damaged(draw, WHOLE)), read_model),
+    "eitm": ("a.eitm", lambda draw: resealed(damaged(draw, whole_models())), read_model),
     "layout": ("c.toml", lambda draw: damaged(draw, [LAYOUT]), read_layout),
     "zones": ("d.toml", lambda draw: damaged(draw, [ZONES]), read_zones),
     "presses": ("b.npz", lambda draw: archive(draw, PRESSES), read_presses),

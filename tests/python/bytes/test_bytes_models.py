@@ -16,8 +16,12 @@ from small_models import tiny_blob
 ENOUGH_WORK = 10_000
 
 
+def whole_models() -> list[bytes]:
+    return [tiny_blob(storage) for storage in ("f32", "f16", "i16", "i8")]
+
+
 def damaged_models() -> st.SearchStrategy[bytes]:
-    return any_bytes([tiny_blob(storage) for storage in ("f32", "f16", "i16", "i8")])
+    return any_bytes(whole_models())
 
 
 def resealed(content: bytes) -> bytes:

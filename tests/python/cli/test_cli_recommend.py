@@ -82,7 +82,7 @@ def test_reconstruct_with_a_preset(json_of, frames_file, ran):
     most = max(frame["info"]["iterations"] for frame in fine["frames"])
     solves = 2 if point.configuration.second_pass else 1
     assert most == solves * fine["settings"]["iterations"] != 60
-    assert fine["summary"]["miou_image"] > usual["summary"]["miou_image"]
+    assert fine["summary"]["miou_image"] >= usual["summary"]["miou_image"]
     for info in (frame["info"] for frame in fine["frames"] + usual["frames"]):
         assert info["solve_us"] > 0 and info["touch_us"] >= 0
     quick = json.loads(ran(0, f"reconstruct {frames_file} --preset fast --json")[0])

@@ -204,7 +204,7 @@ def test_another_protocol_names_both_hashes_and_files(refused, changed_frames, t
     line = refused(PROTOCOL, f"reconstruct {path} -o {tmp_path / 'out.npz'}")
     assert str(path) in line and "prebuilt paper skin" in line
     assert f"{prebuilt()[0].protocol.hash:016x}" in line
-    assert line.count("(16 electrodes, 208 rows)") == 2
+    assert line.count("16 electrodes, 208 rows)") == 2
 
 
 # ---- skins ----

@@ -61,7 +61,8 @@ def test_an_open_electrode_is_found_by_the_doctor_and_told_by_the_board():
 
 def test_protocols_that_need_no_model():
     for protocol in (adjacent(16), opposite(16), skip(16, 3), adjacent(8), skip(11, 2)):
-        board = info(model_crc=1, protocol_hash=protocol.hash, n_electrodes=protocol.n_electrodes)
+        electrodes, rows = protocol.n_electrodes, protocol.n_rows
+        board = info(model_crc=1, protocol_hash=protocol.hash, n_electrodes=electrodes, n_rows=rows)
         assert scanned_protocol(board, None, "x").hash == protocol.hash
     with pytest.raises(DeviceError, match="only its model tells; name its file with"):
         scanned_protocol(info(model_crc=1, protocol_hash=1), None, "x")

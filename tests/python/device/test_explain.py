@@ -195,7 +195,8 @@ def test_other_counts_are_refused(count):
 
 @pytest.mark.parametrize("protocol", [adjacent(8), opposite(16), skip(16, 4)])
 def test_usual_protocols_are_known_without_a_model(protocol):
-    info = board_info(protocol_hash=protocol.hash, n_electrodes=protocol.n_electrodes)
+    electrodes, rows = protocol.n_electrodes, protocol.n_rows
+    info = board_info(protocol_hash=protocol.hash, n_electrodes=electrodes, n_rows=rows)
     found = scanned_protocol(info, None, "port")
     assert np.array_equal(found.drive_measure, protocol.drive_measure)
 

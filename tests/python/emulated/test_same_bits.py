@@ -140,7 +140,7 @@ def test_instructions_are_counted_exactly(program, tmp_path):
                 f"{solver}: {result.solve_instructions} + {result.touch_instructions} instructions,"
                 f" {per_mac:.2f} a MAC"
             )
-            assert per_mac < 4.5  # multipoles take 5, matrices 2
+            assert per_mac < 5.5  # multipoles take 5 to 7, matrices 2
 
 
 def moving_touches() -> tuple[np.ndarray, np.ndarray]:
