@@ -26,6 +26,7 @@ from eitskin.model.model import (
 )
 from eitskin.model.model_errors import (
     ModelErrors,
+    check_geom,
     decode_model_errors,
     decode_places,
     decode_row_errors,
@@ -43,11 +44,12 @@ MIRROR_ROWS = 4
 FOLD_DTYPE = np.dtype([("first", "<u2"), ("second", "<u2"), ("sign", "<i2"), ("reserved", "<u2")])
 FOLD_NONE = 0xFFFF
 REMOVED_SOLVER = 2
+NEEDS = {"UNCE": "WHIT", "GEOM": "UNCE", "MOVE": "GEOM", "ROWE": "UNCE"}  # sections of others
 """Coordinate descent, in models of earlier versions: the number stays reserved."""
 SCALED = ("i16", "i8")
 MAX_ROWS, MAX_RANK, MAX_PIXELS, MAX_SIDE = 65534, 1024, 65535, 4096
 MAX_ITERATIONS = 100_000
-MIN_RADIUS_MM, HUGE = 1e-6, 1e30
+MIN_RADIUS_MM, HUGE = float(np.float32(1e-6)), float(np.float32(1e30))
 NEARER = "choose units nearer to volts and siemens per metre"
 MIN_LIPSCHITZ, MAX_FLOAT32 = 2.0**-126, float(np.finfo(np.float32).max)
 
@@ -404,13 +406,20 @@ def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model
         ),
         precision=_read_precision(sections, d, where),
         place_factor=_read_place_factor(sections, where),
-        model_errors=(_read_model_errors(sections, d, where) if "UNCE" in sections else None),
+        model_errors=_read_model_errors(sections, d, where),
     )
 
 
-def _read_model_errors(sections: Sections, d: _Dims, where: str) -> ModelErrors:
+def _read_model_errors(sections: Sections, d: _Dims, where: str) -> ModelErrors | None:
     """Read the model errors. GEOM without MOVE (format 1.9) is ignored: no reader uses it any
-    more."""
+    more; but its numbers must be in range."""
+    for name, needed in NEEDS.items():
+        if name in sections and needed not in sections:
+            _refuse(where, f"section {name!r} without section {needed!r}")
+    if "UNCE" not in sections:
+        return None
+    if "GEOM" in sections:
+        check_geom(sections["GEOM"], d.n_folded, where)
     both = "GEOM" in sections and "MOVE" in sections
     places = decode_places(sections["GEOM"], sections["MOVE"], d.n_folded, where) if both else None
     rows = (

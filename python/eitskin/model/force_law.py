@@ -13,7 +13,9 @@ from eitskin.errors import ModelError
 
 HEAD = struct.Struct("<IIfff12x")
 MAX_POINTS, MAX_ORDER = 64, 4
-MIN_RADIUS_MM, HUGE, MAX_REACH, MAX_COEFFICIENT = 1e-6, 1e30, 1e3, 1e6
+# in float32, as the C core compares
+MIN_RADIUS_MM, HUGE = float(np.float32(1e-6)), float(np.float32(1e30))
+MAX_REACH, MAX_COEFFICIENT = 1e3, 1e6
 
 
 def terms_of(order: int) -> list[tuple[int, int]]:

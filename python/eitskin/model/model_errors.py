@@ -19,7 +19,7 @@ MAX_ROWS, MAX_MM = 32, 1e6
 MIN_DISTANCE = 1e-6
 MOVE_TERMS = (1, 3, 6, 10, 15)  # terms of a polynomial in two coordinates, of degree 0 to 4
 ROW_GAINS = 1
-HUGE = 1e30
+HUGE = float(np.float32(1e30))  # as the C core compares
 NEGATIVE = 1e-5  # a negative eigenvalue up to this part of the greatest counts as rounding
 
 
@@ -93,7 +93,7 @@ def decode_row_errors(
     ):
         raise ModelError(_other_size(where, "ROWE"))
     numbers = np.frombuffer(content, dtype="<f4", offset=ROWE_HEAD.size)
-    if not (np.abs(numbers) <= MAX_MM).all() or not MIN_DISTANCE <= distance <= MAX_MM:
+    if not (np.abs(numbers) <= MAX_MM).all() or not np.float32(MIN_DISTANCE) <= distance <= MAX_MM:
         raise ModelError(
             f"{where}: holds a number in section 'ROWE' that is out of range; build the model again"
         )
@@ -190,9 +190,7 @@ def decode_places(geom: bytes, move: bytes, folds: int, where: str) -> TarePlace
     Raises:
         ModelError: a length does not fit the counts, or a number is out of range.
     """
-    rows, over = divmod(len(geom), 4 * folds)
-    if over or not 1 <= rows <= MAX_ROWS:
-        raise ModelError(_other_size(where, "GEOM"))
+    left = check_geom(geom, folds, where)
     headed = len(move) >= MOVE_HEAD.size
     count, terms, rest = MOVE_HEAD.unpack_from(move) if headed else (0, 0, 0)
     if (
@@ -202,14 +200,8 @@ def decode_places(geom: bytes, move: bytes, folds: int, where: str) -> TarePlace
         or len(move) != MOVE_HEAD.size + 4 * (count * (folds + 2 * terms) + rest * folds)
     ):
         raise ModelError(_other_size(where, "MOVE"))
-    left = np.frombuffer(geom, dtype="<f4").reshape(folds, rows)
     numbers = np.frombuffer(move, dtype="<f4", offset=MOVE_HEAD.size)
-    for name, values in (("GEOM", left), ("MOVE", numbers)):
-        if not (np.abs(values) <= MAX_MM).all():
-            raise ModelError(
-                f"{where}: holds a number in section {name!r} that is out of range; build the model"
-                " again"
-            )
+    _check_lengths(numbers, "MOVE", where)
     seen, moves, outside = np.split(numbers, np.cumsum([folds * count, 2 * terms * count]))
     return TarePlaces(
         np.ascontiguousarray(left.T),
@@ -217,6 +209,28 @@ def decode_places(geom: bytes, move: bytes, folds: int, where: str) -> TarePlace
         moves.reshape(2, terms, count),
         np.ascontiguousarray(outside.reshape(folds, rest).T),
     )
+
+
+def check_geom(geom: bytes, folds: int, where: str) -> Float32s:
+    """Return the numbers of section GEOM, (folds, p).
+
+    Raises:
+        ModelError: the length does not fit, or a number is out of range.
+    """
+    rows, over = divmod(len(geom), 4 * folds)
+    if over or not 1 <= rows <= MAX_ROWS:
+        raise ModelError(_other_size(where, "GEOM"))
+    left = np.frombuffer(geom, dtype="<f4").reshape(folds, rows)
+    _check_lengths(left, "GEOM", where)
+    return left
+
+
+def _check_lengths(values: Float32s, name: str, where: str) -> None:
+    if not (np.abs(values) <= MAX_MM).all():
+        raise ModelError(
+            f"{where}: holds a number in section {name!r} that is out of range; build the model"
+            " again"
+        )
 
 
 def _other_size(where: str, name: str) -> str:

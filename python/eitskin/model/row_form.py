@@ -19,7 +19,7 @@ Float32s = npt.NDArray[np.float32]
 
 ORTHOGONAL = 1e-5  # greatest cosine between two rows of P that count as orthogonal
 HEAD = struct.Struct("<3f4x")
-HUGE = 1e30
+HUGE = float(np.float32(1e30))  # as the C core compares
 TINY = float(np.finfo(np.float32).tiny)
 
 
