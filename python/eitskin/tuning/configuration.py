@@ -41,7 +41,7 @@ class Configuration:
             new ones.
         touch_sweeps: sweeps of the off-grid fit; 0 leaves touches at the peaks of the image.
         touch_fit: parts of the touch fit (``core.results``: log data 1, split and merge 2,
-            interaction 4).
+            interaction 4, joint fit 32).
         model_errors: whether the model holds model errors, for row gains and the test of touches.
             They cost time, and prevent false touches on skins unlike the model.
         second_pass: the image is solved again with the interaction of touches removed from the
