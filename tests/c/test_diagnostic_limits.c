@@ -142,6 +142,42 @@ TEST(stale_references_on_both_sides_of_the_limit)
     }
 }
 
+static int scale_is_off(eits_context *ctx, const eits_real *frame)
+{
+    ctx->info.diagnostics = 0;
+    eits_check_scale(ctx, frame);
+    CHECK(ctx->info.diagnostics == 0 || ctx->info.diagnostics == EITS_DIAGNOSTIC_STALE_REFERENCE);
+    return ctx->info.diagnostics != 0;
+}
+
+TEST(a_frame_of_another_scale_than_the_reference_is_named)
+{
+    static const struct {
+        double scale;
+        int off;
+    } CASES[] = {{1, 0},    {0.51, 0}, {0.49, 1}, {1.99, 0}, {2.01, 1},
+                 {0.01, 1}, {1e6, 1},  {-1, 1},   {0, 1},    {1e37, 1}};
+    eits_context *ctx = set_up(&b, EITS_DATA_DIFFERENCE);
+    eits_real frame[SMALL_ROWS];
+    memset(ctx->rows.unusable, 0, SMALL_ROWS);
+    for (size_t k = 0; IN_TABLE(k, CASES); ++k) {
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            frame[i] = (eits_real)CASES[k].scale * ctx->reference.v0[i];
+        CHECK_EQUAL(scale_is_off(ctx, frame), CASES[k].off);
+    }
+    memcpy(frame, ctx->reference.v0, sizeof frame);
+    frame[3] = 1000; /* one row alone, which counts unless it is left out */
+    CHECK_EQUAL(scale_is_off(ctx, frame), 1);
+    ctx->rows.unusable[3] = EITS_ROW_OUTLIER;
+    CHECK_EQUAL(scale_is_off(ctx, frame), 0);
+    frame[4] = 1000;
+    CHANGE_OPTIONS(ctx, o.diagnostics &= ~(uint32_t)EITS_DIAGNOSTIC_STALE_REFERENCE);
+    CHECK_EQUAL(scale_is_off(ctx, frame), 0);
+    CHANGE_OPTIONS(ctx, o.diagnostics = EITS_DIAGNOSTICS_ALL);
+    memset(ctx->rows.unusable, EITS_ROW_MASKED, SMALL_ROWS); /* nothing to judge by */
+    CHECK_EQUAL(scale_is_off(ctx, frame), 0);
+}
+
 /* ---- mismatch ---- */
 
 /* d = what a sheet gives, and `off` times what none gives; 1 where it is judged a mismatch. */

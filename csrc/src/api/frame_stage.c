@@ -136,6 +136,8 @@ eits_status eits_frame_data(eits_context *ctx, const eits_scratch *scratch, cons
             *macs += eits_build_basis(ctx, scratch);
         count = eits_reduce_frame(ctx, scratch, macs);
     }
+    if (judged)
+        eits_check_scale(ctx, frame);
     *macs += ctx->whitening.form ? eits_whiten_data(ctx, ctx->frame.y) : 0;
     *macs += eits_project(ctx, ctx->frame.y);
     ctx->frame.has_y_log = judged && model->data_kind == EITS_DATA_DIFFERENCE &&

@@ -97,6 +97,14 @@
 /* and so much [lambda_noise]. larger: as above; smaller: noise is reported */
 #define EITS_STALE_NOISE R(5.0)
 
+/* ---- Chosen: by hand, between what loses touches (.1 and 3 times the reference's scale) and the
+ * scenes of the library: .87 to 1.19 times, and .74 with a loose electrode. Check: scripts/test
+ * tests/python/oracle/test_faults.py -k scale */
+
+/* all rows together have more than so many times the reference's size, or less than its inverse.
+ * larger: touches are lost without a word; smaller: hands on small pads are reported */
+#define EITS_STALE_SCALE R(2.0)
+
 /* ---- Chosen: on a hydrogel skin taught by its first 100 presses, seven streams of 60 from press
  * 100 to 340: 1 false touch, 2 of 420 presses held back; .3 whatever max(S'y) is: false touches
  * stop the reference in five. Check: eitskin study teaching --data FOLDER */

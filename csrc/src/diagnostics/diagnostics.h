@@ -72,6 +72,10 @@ int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, ui
  * info.lambda_max must be known. */
 void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient);
 
+/* Set STALE_REFERENCE if the frame has another scale than the reference. On entry rows.unusable
+ * marks all rows that are left out. */
+void eits_check_scale(eits_context *ctx, const eits_real *frame);
+
 /* For taught models with reference tracking: whether the touches of this frame are in fact a change
  * of the skin itself, because they explain too little of the data. info.lambda_max and
  * info.unexplained must be known. */

@@ -131,6 +131,25 @@ void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient)
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
 }
 
+/* The direction of gain drift is ignored, so that a frame of many times the reference's size would
+ * lose its touches without a word: what is left of them is judged against that size. The scale is
+ * a ratio of sums and not of squares, so that no row counts for much and nothing overflows but what
+ * is far too large. */
+void eits_check_scale(eits_context *ctx, const eits_real *frame)
+{
+    const eits_real *v0 = ctx->reference.v0;
+    eits_real along = 0, size = 0;
+    for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
+        if (ctx->rows.unusable[i] != 0)
+            continue;
+        along += v0[i] < 0 ? -frame[i] : frame[i];
+        size += eits_fabs(v0[i]);
+    }
+    const int alike = along >= size / EITS_STALE_SCALE && along / EITS_STALE_SCALE <= size;
+    if (size > 0 && !alike && eits_wants(ctx, EITS_DIAGNOSTIC_STALE_REFERENCE))
+        ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
+}
+
 /* A taught model brings the noise's own metric, in which touches explain nearly all of a press and
  * less of what drifts. Without this the first false touch would stop the reference for good. The
  * clearer a touch is, the more it may leave; what stands far out of the noise is one, of whatever

@@ -43,6 +43,7 @@ from eitskin.oracle.examine import (
     mismatch,
     noise_energy,
     outliers,
+    scaled,
     stale,
     unpaired,
 )
@@ -205,6 +206,7 @@ class OracleEngine:
                 else:
                     found.say("model mismatch")
             self._check(frame, unusable, found)
+            scaled(frame, ref, unusable, found)
         return self._whitened(ref, folded, unusable, found)
 
     def _drift(self, ref: Reference, folded: Folded) -> FloatArray | None:

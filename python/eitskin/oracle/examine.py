@@ -265,6 +265,15 @@ def unpaired(model: Model, folded: Folded, found: Found) -> BoolArray:
     return out
 
 
+def scaled(frame: FloatArray, ref: Reference, unusable: BoolArray, found: Found) -> None:
+    """Whether the rows in use have another size than the reference, all together."""
+    v0 = ref.v0[~unusable]
+    along = float((frame[~unusable] * np.where(v0 < 0, -1, 1)).sum())
+    size, most = float(np.abs(v0).sum()), limits.STALE_SCALE
+    if size > 0 and not size / most <= along <= most * size:
+        found.say("stale reference")
+
+
 # ---- after the solve ----
 
 

@@ -227,6 +227,23 @@ def test_stale_references(sign, times_change):
     assert ("stale reference" in names) == opposite_way  # type: ignore[operator]
 
 
+@pytest.mark.parametrize("scale", [0.1, 3.0, 30.0, 1e3, 1e6])
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_frame_of_another_scale_than_the_reference_is_named(count, scale):
+    """Other units or another gain than at the tare lose touches, since the drift of the gain is
+    ignored: that is said. Frames of a scale that a skin may have say nothing."""
+    touches = random_touches(paper_skin().outline, 2, 9, "test", TouchRules(count=(count, count)))
+    scenes = simulate(paper_skin(), adjacent(16), touches, measurement=Measurement(snr_db=60.0))
+    made = AllEngines(*prebuilt(), engines=("c", "c64", "numpy"))
+    made.tare(scenes.untouched_v.astype(np.float32).astype(float))
+    for frame in scenes.frames_v:
+        for name, one in made.items():
+            assert "stale reference" in said(one, scale * frame)[3], name  # type: ignore[operator]
+            for healthy in (0.7, 1.0, 1.4):
+                found = said(one, healthy * frame)[3]
+                assert "stale reference" not in found, (name, healthy)  # type: ignore[operator]
+
+
 def test_crowded_is_the_score_of_what_the_core_found():
     """On 24 scenes of 1 to 8 touches at 40 and 60 dB, without the test of touches, which is
     another reason: the oracle's score of the core's touches, but where it is within .02 of the
