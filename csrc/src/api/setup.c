@@ -8,6 +8,7 @@
 #include "frame/whitening.h"
 #include "model/options.h"
 
+#include "multipole/multipole.h"
 #include <string.h>
 
 _Static_assert(sizeof(eits_context) <= EITS_CONTEXT_SIZE, "EITS_CONTEXT_SIZE is too small");
@@ -109,8 +110,7 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
     lend(made);
     map_cells(model, made->cell);
     eits_clear_column_cache(&made->columns);
-    for (uint32_t k = 0; k < EITS_MAX_TOUCHES; ++k)
-        made->multipole.home_pixel[k] = EITS_NO_HOME;
+    eits_pole_forget(made);
     /* 1 and not 0: a model without row gains multiplies by these numbers too, which leaves the bits
      * unchanged */
     for (uint32_t i = 0; i < model->n_rows; ++i)

@@ -191,6 +191,7 @@ int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j)
     eits_joint_known known[EITS_MAX_TOUCHES];
     j->count = 0;
     j->spent = 0;
+    eits_pole_forget(ctx);
     if (!may_fit(ctx, f) || !fit_clearly(ctx, f, j, known))
         return 0;
     const eits_real excess = eits_joint_excess(ctx, j);

@@ -66,6 +66,10 @@ void eits_pole_field(const eits_context *ctx, uint32_t k, const eits_shape *shap
 uint64_t eits_pole_induced(eits_context *ctx, const eits_shape *shape, uint32_t count,
                            const eits_poles *poles, uint32_t rounds);
 
+/* No polynomial is kept: at the start of a frame, so that neither its work nor what its budget
+ * allows depends on frames before. */
+void eits_pole_forget(eits_context *ctx);
+
 /* Nothing is induced: before the first rounds of a frame. */
 void eits_pole_clear(eits_context *ctx, uint32_t count);
 

@@ -214,6 +214,12 @@ uint64_t eits_pole_home(eits_context *ctx, uint32_t k, const eits_shape *shape)
            (uint64_t)8u * p.count * b.terms * b.terms;
 }
 
+void eits_pole_forget(eits_context *ctx)
+{
+    for (uint32_t k = 0; k < EITS_MAX_TOUCHES; ++k)
+        ctx->multipole.home_pixel[k] = EITS_NO_HOME;
+}
+
 int eits_pole_on_skin(const eits_context *ctx, eits_real x, eits_real y)
 {
     const eits_model *model = ctx->model;
