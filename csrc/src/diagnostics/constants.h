@@ -97,9 +97,9 @@
 /* and so much [lambda_noise]. larger: as above; smaller: noise is reported */
 #define EITS_STALE_NOISE R(5.0)
 
-/* ---- Chosen: by hand, between what loses touches (.1 and 3 times the reference's scale) and the
- * scenes of the library: .87 to 1.19 times, and .74 with a loose electrode. Check: scripts/test
- * tests/python/oracle/test_faults.py -k scale */
+/* ---- Chosen: by hand, between what loses touches (.1 and 10 times the reference's scale, with the
+ * library's two_touch) and the scenes of the library: .87 to 1.19 times, and .74 with a loose
+ * electrode. Check: scripts/test tests/python/oracle/test_faults.py -k scale */
 
 /* all rows together have more than so many times the reference's size, or less than its inverse.
  * larger: touches are lost without a word; smaller: hands on small pads are reported */

@@ -8,7 +8,14 @@ from collections.abc import Iterable, Iterator
 from tqdm import tqdm
 
 from eitskin.cli.arguments import Output, above, option
-from eitskin.cli.device_options import add_device, add_scan, add_stream, read_mode, session_settings
+from eitskin.cli.device_options import (
+    add_device,
+    add_name,
+    add_scan,
+    add_stream,
+    read_mode,
+    session_settings,
+)
 from eitskin.cli.printing import answer, say, say_progress
 from eitskin.session.frame import Frame, Message, Notice
 from eitskin.session.session import Session
@@ -27,6 +34,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_stream(parser, "raw,image,touches")
     seconds = "stop after S seconds of the board's time"
     option(parser, "--seconds S", seconds, float, within=(above(0), 1e6))
+    add_name(parser)
     add_scan(parser)
     parser.set_defaults(run=run)
 
@@ -43,9 +51,14 @@ def run(options: argparse.Namespace) -> int:
             say("stopped")
         finally:
             messages.close()
-        summary, recorder = session.finish(), session.recorder
+        summary, recorder, source = session.finish(), session.recorder, session.source
     assert recorder is not None
-    facts = {"recording": str(options.output), "packets": recorder.packets, "bytes": recorder.bytes}
+    facts = {
+        "recording": str(options.output),
+        "source": source,
+        "packets": recorder.packets,
+        "bytes": recorder.bytes,
+    }
     written = f"{options.output}: {recorder.packets} packets, {recorder.bytes} bytes"
     return answer(options, facts | summary.as_dict(), *summary.lines(), written)
 

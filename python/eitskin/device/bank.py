@@ -28,13 +28,18 @@ def record_bytes(model: bytes, generation: int) -> bytes:
     return head + struct.pack("<I", zlib.crc32(head))
 
 
+def too_large(model_bytes: int, room_bytes: int) -> str:
+    """Why a model of ``model_bytes`` has no place in a bank with room for ``room_bytes``."""
+    return (
+        f"the model has {model_bytes} bytes and a bank of the board holds {room_bytes}; build it"
+        " with  --storage i8,  fewer pixels or a lower rank (eitskin model build --help)"
+    )
+
+
 def bank_bytes(model: bytes, generation: int, bank_bytes: int = BANK_BYTES) -> bytes:
     """A whole bank of ``bank_bytes`` with ``model`` and its record; what lies between is as erased
     flash reads, 0xFF."""
     room = record_offset(bank_bytes)
     if len(model) > room:
-        raise DeviceError(
-            f"the model has {len(model)} bytes and a bank of the board holds {room}; build it with"
-            " fewer pixels, a lower rank or a smaller storage type (eitskin model build --help)"
-        )
+        raise DeviceError(too_large(len(model), room))
     return model + bytes([ERASED]) * (room - len(model)) + record_bytes(model, generation)

@@ -5,6 +5,7 @@ import zlib
 from pathlib import Path
 
 from eitskin import __version__
+from eitskin.device.bank import too_large
 from eitskin.device.link import Link
 from eitskin.device.wire.link_table import LINK_VERSION
 from eitskin.device.wire.packets import BoardInfo
@@ -95,6 +96,17 @@ def scanned_pattern(info: BoardInfo) -> str:
     """Return the name of the pattern that the board scans, or that it is a table."""
     made = scanned(info)
     return f"a table of {info.n_rows} rows" if made is None else pattern_name(made)
+
+
+def check_fits(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
+    """Refuse a model that the board cannot hold, or whose electrodes it does not have."""
+    if model.protocol.n_electrodes > info.electrodes:
+        raise DeviceError(
+            f"{name}: the model's protocol needs {model.protocol.n_electrodes} electrodes and the"
+            f" board has {info.electrodes}; frames in files need no board:  eitskin reconstruct"
+        )
+    if len(blob) > info.bank_bytes:
+        raise DeviceError(f"{name}: {too_large(len(blob), info.bank_bytes)}")
 
 
 def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from eitskin.config import nearest
-from eitskin.device.check import check_model
+from eitskin.device.check import check_fits, check_model
 from eitskin.device.client import Device
 from eitskin.device.link import Reconnect
 from eitskin.device.pacing import Pacer
@@ -17,7 +17,7 @@ from eitskin.device.source import open_source, source_schemes
 from eitskin.device.timing import split_name, split_timing
 from eitskin.device.transport import Transport
 from eitskin.device.wire.packets import BoardInfo
-from eitskin.errors import EitskinError, UsageError, missing_checkout
+from eitskin.errors import DeviceError, EitskinError, UsageError, missing_checkout
 
 AS_IN = {
     "serial": "serial:/dev/ttyACM0",
@@ -28,6 +28,7 @@ AS_IN = {
 }
 SCHEMES = ("auto", *AS_IN)
 MAX_BAUD = 20_000_000
+HAVE_THEIR_OWN = ("auto", "serial", "file")  # other boards get the model that is named
 RATE_SLACK = 1.001  # frame periods are whole microseconds
 
 
@@ -60,17 +61,30 @@ def open_device(
         device.close()
         raise
     device.pacer = Pacer(split_timing(url)[1].speed or 0.0)
-    if model is not None and device.board.has_model:
-        from eitskin.model.eitm import decode_model
-
+    if model is not None:
         try:
-            check_model(
-                device.board, decode_model(model, "the model"), model, device.transport.name
-            )
+            _check_given(device, url, model)
         except BaseException:
             device.close()
             raise
     return device
+
+
+def _check_given(device: Device, url: str, blob: bytes) -> None:
+    """Refuse a model that is not the board's, or that the board cannot use."""
+    from eitskin.model.eitm import decode_model
+
+    model, name = decode_model(blob, "the model"), device.transport.name
+    if device.board.has_model:
+        check_model(device.board, model, blob, name)
+        return
+    check_fits(device.board, model, blob, name)
+    if split_timing(split_name(url)[0])[0].partition(":")[0] not in HAVE_THEIR_OWN:
+        raise DeviceError(
+            f"{name}: the model ({model.grid.n_pixels} pixels, {model.protocol.n_rows} rows, rank"
+            f" {model.rank}) does not fit the board's memory or its packets; build it with fewer"
+            " pixels or a lower rank (eitskin model build --help)"
+        )
 
 
 def _check_rate(device: Device) -> None:

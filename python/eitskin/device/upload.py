@@ -5,6 +5,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from eitskin.device.check import check_fits
 from eitskin.device.exchange import CommandExchange
 from eitskin.device.wire.explain import reply_text
 from eitskin.device.wire.link_table import (
@@ -68,18 +69,7 @@ def _checked(device: CommandExchange, model: str | Path | bytes) -> bytes:
         decoded, blob = decode_model(model, "the model"), model
     else:
         decoded, blob = load_model(model)
-    info, name = device.board, device.transport.name
-    if len(blob) > info.bank_bytes:
-        raise DeviceError(
-            f"{name}: the model has {len(blob)} bytes and the board takes {info.bank_bytes}; build"
-            " it with fewer pixels, a lower rank or a smaller storage type (eitskin model build"
-            " --help)"
-        )
-    if decoded.protocol.n_electrodes > info.electrodes:
-        raise DeviceError(
-            f"{name}: the model's protocol needs {decoded.protocol.n_electrodes} electrodes and the"
-            f" board has {info.electrodes}"
-        )
+    check_fits(device.board, decoded, blob, device.transport.name)
     return blob
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import asdict
@@ -167,3 +168,13 @@ def test_start_up_imports_little():
     )
     done = run_python(code, "model", "info")
     assert (done.returncode, done.stderr) == (0, "[]\n")
+
+
+def test_pixels_too_coarse_for_a_narrow_skin_are_told(ran, tmp_path):
+    skin, strip = tmp_path / "skin.toml", "polygon_mm = [[0, 0], [240, 0], [240, 20], [0, 20]]"
+    skin.write_text(SKIN.format(outline=strip, count=16, kind="adjacent"))
+    build = f"model build {skin} -o {tmp_path / 'strip.eitm'} --elements 900 --samples 0"
+    _, err = ran(0, build, "--pixels 16")
+    assert re.search(r"a pixel of [0-9.]+ mm is too coarse for a skin about 18\.5 mm wide", err)
+    assert "build it with  --pixels N" in err
+    assert "too coarse" not in ran(0, build)[1]

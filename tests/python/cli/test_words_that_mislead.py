@@ -19,6 +19,16 @@ from eitskin.skin.drawing_shapes import DrawingReading
 from small_models import session
 
 RING = "M10 10H110V110H10Z M45 45H75V75H45Z"
+SKIN = """
+[skin]
+name = "small"
+diameter_mm = 100.0
+thickness_mm = 5.0
+conductivity_s_per_m = 0.02
+[electrodes]
+count = 16
+width_mm = 4.0
+"""
 SQUARE = "M10 10H110V110H10Z"
 HIDDEN = {
     "attribute": 'display="none"',
@@ -186,3 +196,19 @@ def test_printed_commands_have_their_paths_quoted(tmp_path, capsys, monkeypatch)
     capsys.readouterr()
     assert main(["import", "my run/a b.csv", "-o", "my run/c d.npz", *words]) == 0
     assert "eitskin doctor 'my run/c d.npz'" in capsys.readouterr().out
+
+
+def test_presses_that_are_continued_are_named_with_their_option(tmp_path, capsys):
+    plan, presses = tmp_path / "plan.csv", tmp_path / "presses.npz"
+    skin = tmp_path / "skin.toml"
+    skin.write_text(SKIN)
+    assert main(["teach", "plan", str(skin), "-o", str(plan)]) == 0
+    view = ["view", "--device", "sim:tap", "--folder", str(tmp_path), "--teach", str(plan)]
+    presses.mkdir()
+    capsys.readouterr()
+    assert main(view) != 0
+    said = capsys.readouterr().err
+    assert f"--teach continues {presses}; name another file with  --presses FILE" in said
+    assert said.endswith("; the presses go there unless you say  --presses FILE\n")
+    assert main([*view, "--presses", str(presses)]) != 0
+    assert "--presses FILE" not in capsys.readouterr().err

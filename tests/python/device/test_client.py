@@ -21,11 +21,11 @@ from device_helpers import (
     stats_of,
 )
 
-from eitskin.device.check import check_board, check_model, host_major
+from eitskin.device.check import check_board, check_model, host_major, no_answer
 from eitskin.device.client import Device, _asked_millihz
 from eitskin.device.simulated import SimTransport
 from eitskin.device.transport import Capabilities, LinkEvent, Transport
-from eitskin.device.wire.codec import encode
+from eitskin.device.wire.codec import LinkCounters, encode
 from eitskin.device.wire.link_table import PacketType, Stream
 from eitskin.device.wire.packets import RawFrame, SolvedTouches
 from eitskin.device.wire.payloads import pack
@@ -233,6 +233,15 @@ def test_malformed_payloads_are_counted_and_passed_over():
     with Device(Scripted(*wire)) as device:
         assert device.info().request == 2
         assert (device.counters.malformed, device.counters.gaps) == (2, 0)
+
+
+def test_a_stalled_instrument_is_not_told_to_reset_a_board():
+    port = Scripted(encode(PacketType.INFO, 0, pack(board_info(request=1))))
+    port.capabilities = Capabilities(own_clock=True, instrument=True)
+    with Device(port) as device:
+        said = no_answer(device.link, LinkCounters(), "TARE", 3.0)
+    assert "TARE is not answered within 3 s, as the instrument sends too few frames" in said
+    assert "cable and power" in said and "reset" not in said and "flash" not in said
 
 
 def test_an_excitation_that_the_generator_rounds_stays_what_was_asked():

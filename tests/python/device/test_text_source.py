@@ -122,6 +122,15 @@ def test_a_voltage_reaches_the_core_as_it_was_written(tmp_path):
     assert np.array_equal(np.abs(voltages(items)), np.abs(given[8:].astype(np.float32)))
 
 
+def test_an_offset_is_taken_out_of_a_live_line(tmp_path, layout):
+    """A converter that counts from its middle: the layout's offset is in the units of the lines."""
+    plain, _ = streamed(url_of(tmp_path, layout, "\n".join(lines())))
+    shifted = volts() - 2.048
+    layout_file(tmp_path, LAYOUT.replace("scale = 0.001\n[", "scale = 0.001\noffset = -2048\n["))
+    moved, _ = streamed(url_of(tmp_path, layout, "\n".join(lines(shifted))))
+    assert np.allclose(voltages(moved), voltages(plain), rtol=1e-5, atol=1e-8)
+
+
 def test_lines_that_are_no_frames_are_counted_told_once_and_skipped(tmp_path, layout):
     good = lines()
     short = [line.rpartition(",")[0] for line in good]

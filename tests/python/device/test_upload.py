@@ -4,6 +4,7 @@ the new one is proven."""
 import random
 import zlib
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from device_helpers import (
@@ -19,11 +20,13 @@ from device_helpers import (
 )
 
 from eitskin.device.client import Device
+from eitskin.device.open import open_device
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire import link_table as cmd
 from eitskin.errors import DeviceError, FileError, ModelError
+from eitskin.model.build import BuildSettings, linearise, make_model
 from eitskin.model.eitm import decode_model, encode_model
-from small_models import prebuilt, small_blob, tiny_blob
+from small_models import prebuilt, small, small_blob, tiny_blob
 
 OLD = zlib.crc32(prebuilt()[1])
 
@@ -152,6 +155,41 @@ def test_the_host_refuses_what_cannot_go_before_it_is_sent(tmp_path):
 def test_a_model_too_large_for_the_bank_is_refused_by_the_host():
     room = len(tiny_blob()) + 32 - 16
     board = SimBoard(frames(), [bytes([0xFF]) * room, bytes([0xFF]) * room])
-    said = f"has {len(tiny_blob())} bytes and the board takes {room - 32}"
+    said = f"has {len(tiny_blob())} bytes and a bank of the board holds {room - 32}"
     with sim_device(board) as device, pytest.raises(DeviceError, match=said):
         device.upload_model(tiny_blob())
+
+
+@pytest.mark.parametrize(
+    ("blob", "said"),
+    [
+        (lambda: small_blob(electrodes=32, rank=64), "needs 32 electrodes and the board has 16"),
+        (
+            lambda: fine_blob("i8"),
+            r"4\d{3} pixels, 208 rows, rank 8\) does not fit .* pixels",
+        ),
+        (
+            lambda: fine_blob("f32", 64),
+            r"the model has \d+ bytes and a bank of the board holds 524256; .* --storage i8",
+        ),
+    ],
+)
+@pytest.mark.parametrize("kind", ["sim", "text"])
+def test_a_model_that_a_simulated_board_cannot_use_is_named(kind, blob, said, tmp_path):
+    """Before, the board "had no model", and advised to upload one."""
+    url = "sim:two_touch"
+    if kind == "text":
+        (tmp_path / "lines.csv").write_text(",".join(["1"] * 208) + "\n")
+        (tmp_path / "layout.toml").write_text("[port]\nrate_hz = 10\n")
+        url = f"text:{tmp_path / 'lines.csv'}?layout={tmp_path / 'layout.toml'}"
+    with pytest.raises(DeviceError, match=said):
+        open_device(url, model=blob())
+
+
+@cache
+def fine_blob(storage: str, rank: int = 8) -> bytes:
+    """Of more pixels than a packet's image has."""
+    s = small()
+    linear = linearise(s.skin, s.protocol, pixels_across=76, elements=900)
+    settings = BuildSettings(rank=rank, storage=storage)
+    return encode_model(make_model(s.skin, s.protocol, linear, settings))

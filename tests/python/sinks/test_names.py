@@ -54,6 +54,15 @@ def test_without_a_name_it_is_the_serial_number(capsys):
     assert frame.source == "arm" and frame.message()["source"] == "arm"
 
 
+def test_a_recording_is_made_under_a_name(tmp_path, capsys):
+    path = tmp_path / "run.eits"
+    record = ["record", "--device", "sim:swipe", "-o", str(path), "--frames", "2", "--json"]
+    assert main([*record, "--name", "left"]) == 0
+    assert json.loads(capsys.readouterr().out)["source"] == "left"
+    assert main([*record, "--name", "a b", "--overwrite"]) == 2
+    assert "name 'a b' cannot be used" in capsys.readouterr().err
+
+
 def test_names_stand_in_the_urls_of_all_kinds():
     assert split_name("serial:/dev/x?baud=9600&name=a") == ("serial:/dev/x?baud=9600", "a")
     assert split_name("text:p?layout=l.toml") == ("text:p?layout=l.toml", None)

@@ -53,6 +53,15 @@ class Dying(Heard):
             raise OSError("the cable\nis out")
 
 
+class Leaving(Heard):
+    """Wants to end the program with its second."""
+
+    def write(self, reported: OutgoingMessage) -> None:
+        super().write(reported)
+        if len(self.reported) == 2:
+            raise SystemExit("this sink has seen enough")
+
+
 class Away(Heard):
     def write(self, reported: OutgoingMessage) -> None:
         raise Dropped
@@ -68,11 +77,24 @@ class Entry:
 
 @pytest.fixture
 def made(monkeypatch) -> Iterator[dict[str, Any]]:
-    sinks = {"good": Heard(), "stuck": Stuck(), "dying": Dying(), "away": Away()}
+    sinks: dict[str, Any] = {"good": Heard(), "stuck": Stuck(), "dying": Dying(), "away": Away()}
+    sinks["leaving"] = Leaving()
     monkeypatch.setattr(module, "sinks", lambda: {name: Entry(s) for name, s in sinks.items()})
     monkeypatch.setattr(module, "ENDING_S", 0.1)
     yield sinks
     sinks["stuck"].free.set()
+
+
+def test_a_sink_that_raises_systemexit_has_failed_and_goes_on(swipe, made):
+    said: list[str] = []
+    with Outputs(["leaving:", "good:"], swipe.source, patient=True, say=said.append) as outputs:
+        for frame in swipe.frames[:4]:
+            outputs.put(frame)
+        leaving, good = outputs.end({})
+    assert (leaving["sent"], leaving["failed"]) == (4, 1)
+    assert leaving["error"] == "this sink has seen enough"
+    assert said == ["to leaving:: this sink has seen enough"]
+    assert (good["sent"], good["failed"]) == (5, 0)
 
 
 @pytest.mark.parametrize("patient", [False, True])

@@ -24,6 +24,7 @@ import eitskin
 from eitskin.device.wire.link_table import DriveTouch
 from eitskin.session.frame import Frame
 from eitskin.session.message import schema
+from eitskin.sinks import websocket
 from eitskin.sinks.outputs import Outputs
 
 SUMMARY = {
@@ -199,6 +200,12 @@ def test_tuio_lifts_its_fingers_where_the_stream_is_cut(swipe, osc):
     assert alive == [[t.id for t in touched.touches], []]
 
 
+UPGRADE = (
+    b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+)
+
+
 def test_websocket_clients(swipe):
     from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
@@ -228,10 +235,7 @@ def test_a_websocket_client_that_never_reads_is_left_out(swipe):
     ):
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         deaf.connect(("127.0.0.1", port))
-        deaf.sendall(
-            b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-            b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
-        )
+        deaf.sendall(UPGRADE)
         assert deaf.recv(12) == b"HTTP/1.1 101"
         for _ in range(200):  # until all buffers on the way are full
             if outputs.counts[0]["dropped"]:
@@ -242,6 +246,27 @@ def test_a_websocket_client_that_never_reads_is_left_out(swipe):
                 good.recv(timeout=WAIT_S)
         (counts,) = outputs.counts
         assert counts["dropped"] > 0 and counts["failed"] == 0
+
+
+def test_a_websocket_client_that_only_pings_is_cut(swipe, monkeypatch):
+    """Each ping is answered at once, so answers that nobody reads would fill the memory."""
+    from websockets.sync.client import connect
+
+    monkeypatch.setattr(websocket, "FULL_BYTES", 1 << 15)
+    port = free_port()
+    url = f"ws://127.0.0.1:{port}"
+    ping = bytes([0x89, 0xFD]) + bytes(4) + bytes(125)
+    with Outputs([url], swipe.source) as outputs, socket.socket() as deaf, connect(url) as good:
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        deaf.connect(("127.0.0.1", port))
+        deaf.sendall(UPGRADE)
+        assert deaf.recv(12) == b"HTTP/1.1 101"
+        deaf.settimeout(WAIT_S)
+        with pytest.raises((BrokenPipeError, ConnectionResetError)):
+            for _ in range(20_000):  # 26 MB
+                deaf.sendall(ping * 10)
+        outputs.put(swipe.frames[0])
+        assert json.loads(good.recv(timeout=WAIT_S))["type"] == "frame"
 
 
 @contextlib.contextmanager
@@ -400,6 +425,7 @@ KILLED = """
 import os, signal, sys, time
 from eitskin.cli import live_output
 from eitskin.session.session import Session
+from eitskin.sinks import websocket
 from eitskin.sinks.outputs import Outputs
 from eitskin.sinks.sink import TouchSource
 source = TouchSource("x")

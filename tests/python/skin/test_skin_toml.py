@@ -216,3 +216,13 @@ def test_refused_files(tmp_path, text, error, message):
     with pytest.raises(error, match=message) as caught:
         load_skin(_write(tmp_path, text))
     assert "\n" not in str(caught.value) and "skin.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["a\ud800", "a\nb", "a\x1b[2J"])
+def test_a_name_that_cannot_be_printed_is_refused(name):
+    """A lone surrogate can stand in a model's JSON; no file and no terminal can be given it."""
+    table = skin_to_table(paper_skin())
+    table["skin"]["name"] = name
+    with pytest.raises(ConfigError, match="has characters that cannot be printed") as error:
+        skin_from_table(table, "x.toml")
+    assert str(error.value).isprintable()

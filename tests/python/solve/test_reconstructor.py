@@ -157,6 +157,20 @@ def test_saturated_channels_are_left_out(engine):
             reconstructor.tare(np.vstack([session().untouched_v[:before], damaged]))
 
 
+def test_what_a_numpy_mask_hides_is_a_row_that_cannot_be_used(engine):
+    reconstructor, frame = made(engine), session().frames_v[1]
+    hidden = np.zeros(208, dtype=bool)
+    hidden[[3, 50]] = True
+    masked = reconstructor.reconstruct(np.ma.masked_array(frame, hidden))
+    missing = reconstructor.reconstruct(np.where(hidden, np.nan, frame))
+    assert masked.info.masked == missing.info.masked == 2
+    assert np.array_equal(masked.solver_image, missing.solver_image)
+    none = reconstructor.reconstruct(np.ma.masked_array(frame, False))
+    assert none.info.masked == 0
+    with pytest.raises(FrameError, match="row 3 "):
+        reconstructor.tare(np.ma.masked_array(session().untouched_v[0], hidden))
+
+
 @pytest.mark.parametrize(
     "rows", [np.zeros(207, dtype=bool), np.zeros(208), [1, 2], np.zeros((208, 1), dtype=bool)]
 )
