@@ -68,7 +68,17 @@ def lines(printed: bytes) -> bytes:
     return b"\n".join(kept)
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+# the others are of the same kinds: a backend, a locale, a terminal or a home
+SHORT = ("a notebook's backend", "a locale with a decimal comma", "no home")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in SHORT else pytest.param(name, marks=pytest.mark.long("other settings"))
+        for name in SETTINGS
+    ],
+)
 def test_it_does_and_draws_the_same(name, plain, tmp_path):
     (tmp_path / "rc").write_text(RC)
     if name == "a matplotlibrc":
