@@ -3,6 +3,7 @@
  * forms in complex doubles. */
 #include "steps.h"
 
+#include "context/places.h"
 #include "multipole/constants.h"
 #include "multipole/multipole.h"
 

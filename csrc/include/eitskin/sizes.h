@@ -51,7 +51,8 @@ extern "C" {
 #define EITS_JOINT_PARAMETERS 48u
 #define EITS_JOINT_BLOCK      112u
 
-/* What no touch causes: the drift of the gain, and the model's errors. */
+/* The number of directions of the data that no touch causes: the drift of the gain, and the model's
+ * errors. */
 #define EITS_JOINT_NUISANCES (1u + 32u)
 
 /* Numbers in the lower triangle of the joint fit's normal equations. */

@@ -70,4 +70,14 @@ static inline int eits_all_finite(const eits_real *values, size_t count)
     return all;
 }
 
+/* The unit vector at half the angle of x, y, which is `size` long: between -90 and 90 degrees. */
+static inline void eits_half_angle(eits_real x, eits_real y, eits_real size, eits_real axis[2])
+{
+    const eits_real cosine = x / size;
+    axis[0] = eits_sqrt(cosine < -1 ? 0 : (1 + cosine) / 2);
+    axis[1] = eits_sqrt(cosine > 1 ? 0 : (1 - cosine) / 2);
+    if (y < 0)
+        axis[1] = -axis[1];
+}
+
 #endif

@@ -36,11 +36,15 @@ static void shift_at(const eits_context *ctx, const eits_real at[2], eits_real s
     shift[1] = eits_clamp(shift[1], -reach, reach);
 }
 
+int eits_has_poles(const eits_context *ctx)
+{
+    return ctx->model->fields.at.data != NULL && ctx->model->data_kind == EITS_DATA_DIFFERENCE;
+}
+
 int eits_may_fit_jointly(const eits_context *ctx)
 {
     const eits_model *model = ctx->model;
-    return (ctx->options.touch_fit & EITS_TOUCH_FIT_JOINT) != 0 &&
-           model->data_kind == EITS_DATA_DIFFERENCE && model->fields.at.data != NULL &&
+    return (ctx->options.touch_fit & EITS_TOUCH_FIT_JOINT) != 0 && eits_has_poles(ctx) &&
            model->row_errors.vectors != NULL;
 }
 

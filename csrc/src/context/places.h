@@ -7,6 +7,9 @@
 /* Whether places are corrected by what the reference tells: with row gains, for which it holds. */
 int eits_corrects_places(const eits_context *ctx);
 
+/* Whether the model has what multipoles take: fields, and data that are differences. */
+int eits_has_poles(const eits_context *ctx);
+
 /* Whether touches are fitted jointly (joint/joint.h): the option is on, and the model has the
  * fields and the row errors that it takes. */
 int eits_may_fit_jointly(const eits_context *ctx);

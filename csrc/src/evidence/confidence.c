@@ -28,12 +28,11 @@ static int is_known(const eits_real *place_mm2, const eits_real *apart_mm)
            place_mm2[2] > 0;
 }
 
-/* What no disc's own data tell of its place, mm^2. */
-static eits_real variance_of_all(const eits_context *ctx)
+eits_real eits_variance_of_all(const eits_context *ctx, eits_real least)
 {
     const eits_reference *b = &ctx->reference;
     const eits_real pixel = (eits_real)ctx->model->pixel_mm;
-    const eits_real floor = pixel * pixel * EITS_PLACE_MIN,
+    const eits_real floor = pixel * pixel * least,
                     trust = eits_corrects_places(ctx) ? b->place_trust : 0,
                     stays = pixel * pixel * EITS_PLACE_DISTANCE * b->distance;
     return floor + eits_fma(trust, EITS_PLACE_GEOMETRY * b->place_mm2 - stays, stays);
@@ -46,7 +45,7 @@ eits_real eits_confidence(eits_real rise)
 
 void eits_rate_touches(const eits_context *ctx, eits_fit *f)
 {
-    const eits_real least = variance_of_all(ctx),
+    const eits_real least = eits_variance_of_all(ctx, EITS_PLACE_MIN),
                     reach = EITS_MAX_MOVE * (eits_real)ctx->model->pixel_mm;
     for (uint32_t k = 0; k < f->count; ++k) {
         eits_real *place = f->place_mm2[k];

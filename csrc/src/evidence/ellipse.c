@@ -20,16 +20,6 @@
 #include "base/vec.h"
 #include "evidence/constants.h"
 
-void eits_half_angle(eits_real x, eits_real y, eits_real size, eits_real axis[2])
-{
-    const eits_real cosine = x / size;
-    /* between -90 and 90 degrees */
-    axis[0] = eits_sqrt(cosine < -1 ? 0 : (1 + cosine) / 2);
-    axis[1] = eits_sqrt(cosine > 1 ? 0 : (1 - cosine) / 2);
-    if (y < 0)
-        axis[1] = -axis[1];
-}
-
 void eits_long_axis(const eits_scratch *scratch, const eits_answer *answer,
                     const eits_likelihood *likelihood, uint32_t k, eits_real excess,
                     eits_real axis[2])

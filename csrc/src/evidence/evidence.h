@@ -129,9 +129,6 @@ int eits_split_disc(const eits_context *ctx, const eits_answer *one, uint32_t k,
 
 /* ellipse.c */
 
-/* The unit vector at half the angle of x, y, which is `size` long. */
-void eits_half_angle(eits_real x, eits_real y, eits_real size, eits_real axis[2]);
-
 /* Half of disc k's long axis over its radius, as a vector, by the shape that the linearisation
  * gives it; 0, 0 where it is a disc as far as the data tell. `excess`: how much worse than Sigma
  * says the data fit. */
@@ -148,6 +145,10 @@ void eits_place_ellipse(const eits_context *ctx, const eits_disc *disc, const ei
 /* What the test's numbers have meant on scenes with a truth: f->confidence, and f->place_mm2 as
  * wide as places err; zeros where discs were not tested. */
 void eits_rate_touches(const eits_context *ctx, eits_fit *f);
+
+/* The variance of a place along each axis, mm^2, that no touch's own data tell: `least` pixels^2,
+ * and what is left after the correction by the reference. */
+eits_real eits_variance_of_all(const eits_context *ctx, eits_real least);
 
 /* The share of discs of such a rise that were touches. */
 eits_real eits_confidence(eits_real rise);

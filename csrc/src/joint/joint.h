@@ -4,8 +4,9 @@
  *     F = sum over folds ((d - answers) / sigma)^2 - (what the gain's drift explains of it)
  *         + sum over touches of h((|q| - Q) / dQ) + (log(r / R) / dR)^2 + (e_1^2 + e_2^2) / dE^2
  *
- * is minimised by damped Gauss-Newton steps (fit.c). sigma^2 is the noise of a fold and what the
- * multipole model itself errs by, a fraction of the data (report.c). */
+ * is minimised by damped Gauss-Newton steps (fit.c). sigma^2 is the variance of a fold's noise and
+ * of the multipole model's own error, which is a fraction of the data (metric.c). h grows like a
+ * square at first and like a logarithm further out (fit.c). */
 #ifndef EITSKIN_JOINT_H
 #define EITSKIN_JOINT_H
 

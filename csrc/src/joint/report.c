@@ -3,23 +3,15 @@
 
 #include "base/vec.h"
 #include "context/places.h"
-#include "evidence/constants.h"
 #include "joint/constants.h"
 #include "kernels/kernels.h"
-
-/* The sheet's conductivity, S/m. */
-static eits_real sheet_of(const eits_model *model)
-{
-    const eits_real two_pi = R(6.28318530717958647693);
-    return 1 / (two_pi * (eits_real)model->fields.per_sheet);
-}
 
 /* A shape of the disc's strength q r^2 with the amplitude `q`. */
 static eits_shape shape_of(const eits_context *ctx, const eits_disc *d, eits_real q)
 {
     const eits_model *model = ctx->model;
     const eits_real pixel = (eits_real)model->pixel_mm, r = d->radius_mm / pixel,
-                    strength = eits_fabs(d->change) / sheet_of(model) * r * r;
+                    strength = eits_fabs(d->change) / eits_pole_sheet(model) * r * r;
     return (eits_shape){
         .x = (d->x_mm - (eits_real)model->origin_x_mm) / pixel,
         .y = (d->y_mm - (eits_real)model->origin_y_mm) / pixel,
@@ -60,7 +52,7 @@ static int all_finite(const eits_joint *j)
 /* Half of the long axis as a vector; 0, 0 for a disc. a = r ((1 + eta) / (1 - eta))^1/2. */
 static void long_axis(const eits_shape *s, eits_real pixel, eits_real axis_mm[2])
 {
-    const eits_real eta = eits_sqrt(eits_fma(s->e1, s->e1, s->e2 * s->e2));
+    const eits_real eta = eits_pole_eta(s);
     axis_mm[0] = axis_mm[1] = 0;
     if (!(eta > EITS_JOINT_ROUND))
         return;
@@ -68,18 +60,6 @@ static void long_axis(const eits_shape *s, eits_real pixel, eits_real axis_mm[2]
     eits_half_angle(s->e1, s->e2, eta, axis_mm);
     axis_mm[0] *= half;
     axis_mm[1] *= half;
-}
-
-/* What nothing in the frame tells of a place, mm^2: what is left after the correction by the
- * reference, and what the model's own error moves. */
-static eits_real variance_of_all(const eits_context *ctx)
-{
-    const eits_reference *b = &ctx->reference;
-    const eits_real pixel = (eits_real)ctx->model->pixel_mm,
-                    trust = eits_corrects_places(ctx) ? b->place_trust : 0,
-                    stays = pixel * pixel * EITS_PLACE_DISTANCE * b->distance;
-    return pixel * pixel * EITS_JOINT_PLACE_MIN +
-           eits_fma(trust, EITS_PLACE_GEOMETRY * b->place_mm2 - stays, stays);
 }
 
 /* Touch k is a part of what was disc `of`: it is as sure as that was. */
@@ -94,9 +74,9 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
                    eits_fit *f)
 {
     const eits_model *model = ctx->model;
-    const eits_real pixel = (eits_real)model->pixel_mm, sheet = sheet_of(model),
-                    least = variance_of_all(ctx), excess = eits_joint_excess(ctx, j),
-                    unit = pixel * pixel * excess;
+    const eits_real pixel = (eits_real)model->pixel_mm, sheet = eits_pole_sheet(model),
+                    least = eits_variance_of_all(ctx, EITS_JOINT_PLACE_MIN),
+                    excess = eits_joint_excess(ctx, j), unit = pixel * pixel * excess;
     const eits_real whole = eits_joint_data(ctx);
     ctx->info.unexplained = whole > 0 && j->left > 0 ? j->left / whole : 0;
     f->count = j->count;

@@ -9,20 +9,15 @@
 #include "base/vec.h"
 #include "joint/constants.h"
 
-static eits_real eta_of(const eits_shape *s)
-{
-    return eits_sqrt(eits_fma(s->e1, s->e1, s->e2 * s->e2));
-}
-
 /* The longest touch that is long enough; j->count where there is none. */
 static uint32_t longest(const eits_joint *j, const uint8_t *tried)
 {
     uint32_t best = j->count;
     eits_real eta = EITS_JOINT_SPLIT_ETA;
     for (uint32_t k = 0; k < j->count; ++k) {
-        if (!tried[k] && eta_of(&j->shape[k]) > eta) {
+        if (!tried[k] && eits_pole_eta(&j->shape[k]) > eta) {
             best = k;
-            eta = eta_of(&j->shape[k]);
+            eta = eits_pole_eta(&j->shape[k]);
         }
     }
     return best;
@@ -35,7 +30,7 @@ static eits_joint as_two(const eits_joint *one, uint32_t k)
     eits_shape *a = &two.shape[k], *b = &two.shape[two.count++];
     const eits_real away = EITS_JOINT_SPLIT_AWAY * a->radius;
     eits_real axis[2];
-    eits_half_angle(a->e1, a->e2, eta_of(a), axis);
+    eits_half_angle(a->e1, a->e2, eits_pole_eta(a), axis);
     a->radius *= EITS_JOINT_SPLIT_RADIUS;
     a->e1 = a->e2 = 0;
     *b = *a;

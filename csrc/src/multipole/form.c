@@ -29,15 +29,13 @@ void eits_add_times(eits_real *out, eits_complex s, const eits_real *a, uint32_t
 /* eta and e^(i phi) of the long axis. */
 static eits_real long_axis(const eits_shape *s, eits_complex *axis)
 {
-    const eits_real eta = eits_sqrt(eits_fma(s->e1, s->e1, s->e2 * s->e2));
+    const eits_real eta = eits_pole_eta(s);
+    eits_real unit[2];
     *axis = (eits_complex){1, 0};
     if (!(eta > R(1e-6)))
         return 0;
-    const eits_real cosine = s->e1 / eta; /* of twice the angle */
-    axis->re = eits_sqrt(cosine < -1 ? 0 : (1 + cosine) / 2);
-    axis->im = eits_sqrt(cosine > 1 ? 0 : (1 - cosine) / 2);
-    if (s->e2 < 0)
-        axis->im = -axis->im;
+    eits_half_angle(s->e1, s->e2, eta, unit);
+    *axis = (eits_complex){unit[0], unit[1]};
     return eta < EITS_POLE_MAX_ETA ? eta : EITS_POLE_MAX_ETA;
 }
 

@@ -1,4 +1,4 @@
-/* What shapes send into each other and into themselves by the rim.
+/* Compute what shapes send into each other, and by the rim into themselves.
  *
  * Each shape lies in a field a_n (multipole.h) and sends out sum_k B_k (z - c)^-k, with B_k a
  * linear function of conj(a_n). About another shape's middle c_i that is a Taylor series again,

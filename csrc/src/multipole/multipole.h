@@ -25,6 +25,7 @@
 #ifndef EITSKIN_MULTIPOLE_H
 #define EITSKIN_MULTIPOLE_H
 
+#include "base/vec.h"
 #include "context/context.h"
 
 /* Orders that answer at most. The Taylor series has EITS_POLE_TERMS coefficients a_1, a_2 ... of
@@ -46,8 +47,17 @@ typedef struct eits_poles {
     uint32_t sent;   /* outgoing orders that reach others: 1 to EITS_POLE_SENT */
 } eits_poles;
 
-/* Whether the model has what this module needs: fields, and data that are differences. */
-int eits_has_poles(const eits_context *ctx);
+/* eta of a shape. */
+static inline eits_real eits_pole_eta(const eits_shape *s)
+{
+    return eits_sqrt(eits_fma(s->e1, s->e1, s->e2 * s->e2));
+}
+
+/* The sheet's conductivity, S/m. */
+static inline eits_real eits_pole_sheet(const eits_model *model)
+{
+    return 1 / (R(6.28318530717958647693) * (eits_real)model->fields.per_sheet);
+}
 
 /* taylor.c: whether a place lies on a kept pixel. */
 int eits_pole_on_skin(const eits_context *ctx, eits_real x, eits_real y);

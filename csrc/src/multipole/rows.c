@@ -1,4 +1,4 @@
-/* What shapes answer on the folded rows.
+/* Compute what shapes answer on the folded rows.
  *
  * A row's answer is the drive's field with what is induced, times the measuring pair's without it.
  * By reciprocity the reverse is the same once the rounds have converged. */
@@ -23,9 +23,8 @@ typedef struct order_weights {
 static order_weights weights_of(const eits_context *ctx, const eits_form *f)
 {
     const eits_fields *at = &ctx->model->fields;
-    const eits_real pixel = (eits_real)ctx->model->pixel_mm,
-                    sheet = 1 / (2 * PI * (eits_real)at->per_sheet);
-    const eits_real volts = (eits_real)at->volts * sheet * pixel * pixel;
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm;
+    const eits_real volts = (eits_real)at->volts * eits_pole_sheet(ctx->model) * pixel * pixel;
     order_weights w = {{0}, {0}};
     for (uint32_t n = 0; n < f->orders; ++n) {
         const eits_real whole = -(volts * f->excess * (eits_real)(n + 1u) * (PI / 4) * f->gap[n]);

@@ -145,11 +145,6 @@ static void make_basis(const points *p, basis *b)
     }
 }
 
-int eits_has_poles(const eits_context *ctx)
-{
-    return ctx->model->fields.at.data != NULL && ctx->model->data_kind == EITS_DATA_DIFFERENCE;
-}
-
 /* Q* W F of all electrodes into `terms`, and the mirror at the home pixel. */
 static void project_fields(eits_context *ctx, const points *p, const basis *b, uint32_t home,
                            eits_real *terms, eits_real *mirror)

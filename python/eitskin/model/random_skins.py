@@ -115,7 +115,7 @@ class RandomSkins:
         for _ in range(2):
             errors -= explained @ (explained.T @ errors)
         reduced = request.projection @ errors
-        distance = np.sqrt(np.mean(self._log_ratio(v0) ** 2))
+        distance = np.sqrt(np.mean(np.log(self.row_ratio(v0)) ** 2))
         return np.concatenate(
             [reduced.T.ravel(), whole, [distance], np.linalg.norm(errors, axis=0)]
         )
@@ -208,13 +208,14 @@ class RandomSkins:
             )
         return np.asarray(gain * (v - v0))
 
-    def _log_ratio(self, v0: FloatArray) -> FloatArray:
-        """Return y = log(gain v0 / v_ref) (k,), 0 where a row has next to no reference."""
+    def row_ratio(self, v0: FloatArray) -> FloatArray:
+        """Return gain v0 / v_ref (k,) within the bounds of row gains, 1 where a row has next to no
+        reference or another sign. Its logarithm is y."""
         v_ref = self.v_ref
         gain = float(np.linalg.norm(v_ref) / np.linalg.norm(v0))
         defined = (np.abs(v_ref) >= RATIO_DEFINED * np.sqrt(np.mean(v_ref**2))) & (v_ref * v0 > 0)
         ratio = np.where(defined, gain * v0 / np.where(defined, v_ref, 1.0), 1.0)
-        return np.asarray(np.log(np.clip(ratio, 1 / MAX_ROW_GAIN, MAX_ROW_GAIN)))
+        return np.clip(ratio, 1 / MAX_ROW_GAIN, MAX_ROW_GAIN)
 
     def _sensitivity(self, elements: IntArray) -> FloatArray:
         return sensitivity_of(self.request, self.forward, self._pairs, self.v_ref, elements)

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eitskin.arrays import FloatArray
-from eitskin.core.constants_table import MAX_ROW_GAIN, RATIO_DEFINED
+from eitskin.core.constants_table import RATIO_DEFINED
 from eitskin.errors import missing_extra
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import Mesh
@@ -291,9 +291,7 @@ class _Causes:
         solution = forward.solve(conductivity)
         v0 = fold_rows(forward.voltages_of(solution), request.fold)
         gain = float(np.linalg.norm(v_ref) / np.linalg.norm(v0))
-        weak = (np.abs(v_ref) < RATIO_DEFINED * np.sqrt(np.mean(v_ref**2))) | (v_ref * v0 <= 0)
-        ratio = np.clip(gain * v0 / np.where(weak, 1.0, v_ref), 1 / MAX_ROW_GAIN, MAX_ROW_GAIN)
-        ratio = np.where(weak, 1.0, ratio)
+        ratio = skins.row_ratio(v0)
         pairs = element_fields(forward, solution) @ forward.patterns.mix.T
         elements = np.arange(forward.mesh.n_elements)
         columns = sensitivity_of(request, forward, pairs, v0, elements) * conductivity

@@ -3,7 +3,6 @@ touches beside their bound."""
 
 import argparse
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -196,12 +195,14 @@ def run_limit(options: argparse.Namespace) -> int:
         from eitskin.view.panels import check_picture
 
         check_picture(options.picture)
-    settings = bench_limit.Settings(options.scenes, options.seed, model=options.model)
-    settings = replace(settings, cache=options.cache)
-    if options.sets is not None:
-        settings = replace(settings, sets=tuple(options.sets.split(",")))
-    if options.patterns is not None:
-        settings = replace(settings, patterns=tuple(options.patterns.split(",")))
+    chosen: dict[str, Any] = {
+        name: tuple(names.split(","))
+        for name in ("sets", "patterns")
+        if (names := getattr(options, name)) is not None
+    }
+    settings = bench_limit.Settings(
+        options.scenes, options.seed, model=options.model, cache=options.cache, **chosen
+    )
     result = bench_limit.run(settings, named_bar)
     if options.picture is not None:
         from eitskin_studies.pictures.limit_picture import draw_limit
