@@ -191,7 +191,7 @@ class Frame:
 
     @property
     def image_is(self) -> str | None:
-        """What ``image`` is: "touches", "solver", or None."""
+        """Return "touches" or "solver", of which ``image`` is made; None without an image."""
         if self.touch_image is not None:
             return "touches"
         return None if self.solver_image is None else "solver"

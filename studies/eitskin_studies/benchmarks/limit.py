@@ -56,8 +56,8 @@ DIGITS = 4
 
 @dataclass(frozen=True)
 class Settings:
-    """What the command was given. ``samples`` is the number of random skins for the model errors of
-    the models that are built for other patterns; None takes the skin's."""
+    """The settings that the command was given. ``samples`` is the number of random skins for the
+    model errors of the models that are built for other patterns; None takes the skin's."""
 
     scenes: int
     seed: int

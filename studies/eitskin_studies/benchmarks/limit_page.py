@@ -1,4 +1,4 @@
-"""What ``eitskin bench limit`` prints, and what it writes into its page; the failures first."""
+"""Write what ``eitskin bench limit`` prints and fills into its page; failures come first."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What the bound allows and what the product finds, with each pattern and each noise."""
+"""Measure what the bound allows and what the product finds, by pattern and by noise."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
