@@ -129,3 +129,8 @@ use_environment() {
     OPENBLAS_NUM_THREADS=1
     export PATH OPENBLAS_NUM_THREADS
 }
+
+# build_site [ARGUMENT]...: the documentation in build/site; what Sphinx warns of, as a broken link or anchor, is an error.
+build_site() {
+    python -m sphinx -W --keep-going --quiet -c "$root/docs/site" "$@" "$root" "$root/build/site"
+}

@@ -112,7 +112,7 @@ def add_solver(parser: Any) -> None:
         "greatest number of iterations of FISTA, or rounds of the active set (default: the model's)"
     )
     option(parser, "--iterations N", most, within=(1, 1_000_000))
-    gap = "stop once the duality gap is below this fraction of |y|^2 / 2"
+    gap = "stop once the duality gap is below this fraction of half the data's squared norm"
     option(parser, "--gap REL", gap, float, within=(above(0), 1))
     option(
         parser,
