@@ -5,6 +5,10 @@ An error's text is one line that says what was wrong, where, and what to do abou
 docs/reference/error-codes.md lists the codes.
 """
 
+from collections.abc import Iterable
+from importlib.metadata import PackageNotFoundError, metadata
+from importlib.util import find_spec
+
 LONGEST, ENDING = 3000, 1000  # characters of a line, and of the end that is kept of longer ones
 
 
@@ -101,13 +105,38 @@ class SinkError(EitskinError):
     exit_code = 13
 
 
+EXTRAS = {  # the packages of each extra, and the module by which each is found
+    "model": {"scipy": "scipy", "netgen-mesher": "netgen"},
+    "plot": {"matplotlib": "matplotlib"},
+    "drawing": {"svgelements": "svgelements", "ezdxf": "ezdxf"},
+    "view": {"starlette": "starlette", "uvicorn": "uvicorn", "websockets": "websockets"},
+    "completion": {"shtab": "shtab"},
+    "osc": {"python-osc": "pythonosc"},
+    "tuio": {"python-osc": "pythonosc"},
+    "ws": {"websockets": "websockets"},
+    "mqtt": {"paho-mqtt": "paho"},
+    "lsl": {"pylsl": "pylsl"},
+    "mcap": {"mcap-ros2-support": "mcap_ros2"},
+    "foxglove": {"foxglove-sdk": "foxglove"},
+}
+
+
 def missing_checkout(what: str, *folders: str) -> MissingExtraError:
     """Return the error for ``what``, which is in ``folders`` of a checkout and not in the wheel."""
     names = " ".join(f"./{folder}" for folder in folders)
     return MissingExtraError(
-        f"{what} comes with a checkout of eitskin's sources, not with the wheel: in the checkout's"
-        f" folder run  pip install {names}"
+        f"{what} comes with eitskin's sources, not with the wheel: run  git clone {sources_url()} "
+        f" and in its folder  pip install {names}"
     )
+
+
+def sources_url() -> str:
+    """Return the address of the sources, which pyproject.toml states."""
+    try:
+        urls = metadata("eitskin").get_all("Project-URL") or []
+    except PackageNotFoundError:  # run from the sources themselves
+        urls = []
+    return next((url.partition(", ")[2] for url in urls if url.startswith("Source, ")), "URL")
 
 
 def missing_extra(extra: str, package: str) -> MissingExtraError:
@@ -116,3 +145,23 @@ def missing_extra(extra: str, package: str) -> MissingExtraError:
     return MissingExtraError(
         f"this needs {package}, which is not installed: run  pip install 'eitskin[{extra}]'"
     )
+
+
+def need_extras(extras: Iterable[str]) -> None:
+    """Check that the packages of all these ``extras`` are installed, without importing them.
+
+    Raises:
+        MissingExtraError: some are not; the text names all of them, and one pip command.
+    """
+    absent = {
+        extra: [package for package, module in EXTRAS[extra].items() if find_spec(module) is None]
+        for extra in extras
+    }
+    lacking = sorted(extra for extra, packages in absent.items() if packages)
+    if lacking:
+        packages = sorted({package for extra in lacking for package in absent[extra]})
+        *others, last = packages
+        named = f"{', '.join(others)} and {last}, which are" if others else f"{last}, which is"
+        raise MissingExtraError(
+            f"this needs {named} not installed: run  pip install 'eitskin[{','.join(lacking)}]'"
+        )

@@ -5,7 +5,7 @@ import argparse
 import math
 import os
 from collections.abc import Callable, Iterator
-from pathlib import Path, PosixPath
+from pathlib import Path
 from typing import Any
 
 from eitskin.config import plain_number, plain_whole
@@ -25,7 +25,7 @@ PLAIN: dict[Any, Callable[[str], Any]] = {int: plain_whole, float: plain_number}
 plain_number.__name__, plain_whole.__name__ = "float", "int"  # argparse names them in its errors
 
 
-class Output(PosixPath):
+class Output(type(Path())):  # type: ignore[misc]  # of this system: PosixPath or WindowsPath
     """A file that a command writes; ``refuse_named_twice`` checks these."""
 
 

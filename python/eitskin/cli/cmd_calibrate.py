@@ -48,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(parser, "--seed S", "seed of the resamples for the intervals", default=1)
     option(parser, "-o --output OUT.eitm", "the model with its calibration", Output)
     option(parser, "--json")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, extras=("model",))
 
 
 def run(options: argparse.Namespace) -> int:

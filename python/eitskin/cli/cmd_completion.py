@@ -14,7 +14,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " in a folder of $fpath."
     )
     option(parser, "shell", None, choices=("bash", "zsh", "tcsh"))
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, extras=("completion",))
 
 
 def run(options: argparse.Namespace) -> int:

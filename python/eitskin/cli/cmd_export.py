@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(parser, "--elements", "approximate number of triangles", default=3000)
     option(parser, "-o --output OUT.mat", "file to write", Output, required=True)
     option(parser, "--json")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, extras=("model",))
 
 
 def run(options: argparse.Namespace) -> int:

@@ -82,7 +82,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         int,
     )
     option(build, "--json")
-    build.set_defaults(run=run_build)
+    build.set_defaults(run=run_build, extras=("model",))
     voltages = actions.add_parser(
         "voltages",
         help="predict the voltage of each row, and suitable current and gain",

@@ -24,7 +24,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     pixels = "pixels of mask and conductivity, 0 for none (default: %(default)s)"
     option(one, "--truth-pixels N", pixels, default=64)
     option(one, "--json")
-    one.set_defaults(run=run_scene)
+    one.set_defaults(run=run_scene, extras=("model",))
     plan = what.add_parser(
         "plan", help="show what a scene will compute, step by step, and the cost"
     )
@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     option(picture, "scene SCENE", SCENE_HELP)
     option(picture, "-o --output FILE", None, Output, required=True)
-    picture.set_defaults(run=run_picture)
+    picture.set_defaults(run=run_picture, extras=("model", "plot"))
     names = what.add_parser("list", help="list the scenes that ship with the package")
     option(names, "--json")
     names.set_defaults(run=run_list)

@@ -77,7 +77,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(parser, "--overwrite", "overwrite existing files of --to")
     option(parser, "--open", "open the page in this machine's browser")
     add_scan(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, extras=("view",))
 
 
 def run(options: argparse.Namespace) -> int:

@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from eitskin import __version__
 from eitskin.cli.arguments import option, refuse_named_twice
+from eitskin.cli.needed_extras import refuse_missing_extras
 from eitskin.config import nearest
 from eitskin.errors import EitskinError, FileError, UsageError, missing_checkout
 from eitskin.process import take_over
@@ -126,6 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"{parser.format_help()}\nTo begin:  {FIRST}")
             return 0
         refuse_named_twice(options)
+        refuse_missing_extras(options)
         code = int(options.run(options) or 0)
         if sys.stdout is not None:
             sys.stdout.flush()

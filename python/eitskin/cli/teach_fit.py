@@ -39,7 +39,7 @@ def add_parser(actions: Any) -> None:
     )
     option(parser, "--picture OUT.png", "draw presses with their predictions, and the rows", Output)
     option(parser, "--json")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, extras=("model",))
 
 
 def run(options: argparse.Namespace) -> int:

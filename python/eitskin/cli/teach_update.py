@@ -31,7 +31,7 @@ def add_parser(actions: Any) -> None:
     option(parser, "presses PRESSES.npz", "new presses, from  eitskin teach record", Path)
     option(parser, "-o --output NEW.eitm", None, Output, required=True)
     option(parser, "--json")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, extras=("model",))
 
 
 def run(options: argparse.Namespace) -> int:

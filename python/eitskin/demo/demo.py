@@ -1,8 +1,9 @@
-"""Simulate three touches and find them with each engine: all steps from a skin to touches in one
-short session."""
+"""Find three simulated touches with each engine, and compare them with the truth. Their frames ship
+with the package, so that this needs neither scipy nor netgen."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import resources
 from time import perf_counter
 from typing import Any
 
@@ -10,14 +11,11 @@ import numpy as np
 
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import Reconstruction
-from eitskin.frames.frames import Frames
+from eitskin.frames.frames import Frames, load_frames
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
-from eitskin.scene.simulate import Measurement, simulate
 from eitskin.scoring.score import FrameScore, scorer_for
-from eitskin.skin.protocol import adjacent
-from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import ENGINES, Reconstructor
 
 TOUCHES = (
@@ -25,6 +23,9 @@ TOUCHES = (
     TrueTouch(44.0, 22.0, 7.0, 5.0),
     TrueTouch(-6.0, -52.0, 11.0, 4.0),
 )
+SEED, SNR_DB = 1, 60.0  # of the frames that ship
+# made by  eitskin demo --seed 1 --no-board --frames python/eitskin/demo/demo_frames.npz
+SHIPPED = "demo_frames.npz"
 TIMED_RUNS = 200
 ENGINE_NAMES = {"c": "C float32", "c64": "C float64"}
 
@@ -59,14 +60,32 @@ class Demo:
         }
 
 
-def run_demo(seed: int, snr_db: float, step: Callable[[str], None]) -> Demo:
-    """Simulate frames on another, finer mesh, with noise and contacts drawn with ``seed``, and
-    reconstruct them with the prebuilt model. ``step`` is called with a line of text at the start of
-    each step."""
-    step("simulating three touches: mesh, electrodes, forward model, noise")
+def shipped_frames() -> Frames:
+    """Return the frames that ship with the package, with their truth: those of
+    ``simulated_frames(SEED, SNR_DB)``."""
+    with resources.as_file(resources.files("eitskin.demo") / SHIPPED) as path:
+        return load_frames(path)
+
+
+def simulated_frames(seed: int, snr_db: float) -> Frames:
+    """Simulate the touches on another, finer mesh than the model's, with noise and contacts drawn
+    with ``seed``.
+
+    Raises:
+        MissingExtraError: scipy or netgen is not installed.
+    """
+    from eitskin.scene.simulate import Measurement, simulate
+    from eitskin.skin.protocol import adjacent
+    from eitskin.skin.skin import paper_skin
+
     touches = TouchSet("demo", seed, (TouchScene("demo", TOUCHES),))
     measurement = Measurement(snr_db=snr_db)
-    frames = simulate(paper_skin(), adjacent(16), touches, measurement=measurement).as_frames()
+    return simulate(paper_skin(), adjacent(16), touches, measurement=measurement).as_frames()
+
+
+def run_demo(frames: Frames, step: Callable[[str], None]) -> Demo:
+    """Reconstruct ``frames`` with the prebuilt model. ``step`` is called with a line of text when
+    it starts."""
     step("finding them: C core in float32 and float64, numpy")
     model, blob = load_prebuilt()
     results = {}

@@ -37,6 +37,7 @@ def test_the_wheel_is_the_package_alone(installed):
 
 def test_the_wheel_holds_what_a_user_needs_in_little_room(installed):
     for name in ("tuning/front.json", "model/paper.eitm", "scene/library/demo.toml", "py.typed",
+                 "demo/demo_frames.npz",
                  "session/message.schema.json", "sinks/msg/TouchArray.msg"):  # fmt: skip
         assert f"eitskin/{name}" in installed
     assert sum(Path(name).suffix in BUILT for name in installed) == 3  # two cores and a board
