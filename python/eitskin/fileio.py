@@ -5,7 +5,6 @@ Links are followed. Devices and FIFOs are written to directly.
 """
 
 import errno
-import fcntl
 import json
 import os
 import shutil
@@ -15,7 +14,9 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
+
+from filelock import FileLock, Timeout
 
 from eitskin.errors import FileError, missing_extra
 
@@ -100,9 +101,9 @@ def replace_by(temporary: Path, target: Path) -> None:
     Raises:
         OSError: this failed; ``target`` is as it was.
     """
-    temporary.chmod(_mode(target))
-    with temporary.open("rb") as stream:
+    with temporary.open("r+b") as stream:  # Windows brings only what can be written to the disk
         os.fsync(stream.fileno())
+    temporary.chmod(_mode(target))
     temporary.replace(target)
     sync_folder(target)
 
@@ -117,15 +118,33 @@ def sync_folder(path: Path) -> None:
             os.close(folder)
 
 
-def locked(stream: IO[bytes]) -> bool:
-    """Lock ``stream`` for recording; return False if another recorder holds the lock."""
-    try:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system without locks
-        return True
-    return True
+class Claim:
+    """The right to write the file ``path``, which one program has at a time: a locked file beside
+    it, which the system unlocks when the program ends. Readers are not kept out.
+
+    Raises:
+        FileError: another program, or another claim of this one, has it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        target = followed(path)
+        beside = target.with_name(f".{target.name[-100:]}.lock")
+        self._lock = FileLock(beside, timeout=0, thread_local=False)
+        try:
+            self._lock.acquire()
+        except Timeout:
+            raise FileError(
+                f"{path}: another process records to it; stop that, or name another file"
+            ) from None
+        except (OSError, NotImplementedError):  # a file system without locks
+            pass
+
+    def release(self) -> None:
+        """Let others write. It may be called twice."""
+        if self._lock.is_locked:
+            with suppress(OSError):
+                Path(self._lock.lock_file).unlink()
+            self._lock.release()
 
 
 def _mode(path: Path) -> int:

@@ -1,6 +1,5 @@
 """Fixtures for every test of the studies."""
 
-import fcntl
 import hashlib
 import json
 import os
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
 from eitskin.fem import mesh, mesh_worker
 from eitskin_emulator.core_on_qemu import build_cortex_m7
@@ -69,6 +69,5 @@ def cortex_m7() -> Path:
     """A build of everything for the Cortex-M7, brought up to date by whichever process asks first:
     ``firmware/eitskin_BOARD.elf``, ``.bin`` and ``.map``, ``tests/emulated``."""
     BUILD.mkdir(exist_ok=True)
-    with (BUILD / "cortex-m7.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with FileLock(BUILD / "cortex-m7.lock"):
         return build_cortex_m7(ROOT, BUILD / "cortex-m7")

@@ -2,10 +2,11 @@
 
 import errno
 import os
-import select
+import queue
 import socket
 import stat
 import sys
+import threading
 from contextlib import suppress
 from pathlib import Path
 
@@ -93,39 +94,60 @@ class FileLines(LinePort):
 
 
 class PipeLines(LinePort):
-    """Standard input ("-") or a FIFO. A FIFO that nobody writes to yet is waited for."""
+    """Standard input ("-") or a FIFO. A FIFO that nobody writes to yet is waited for. A thread
+    reads, since only sockets can be waited for on every system."""
 
     keeps = True
 
     def __init__(self, path: str) -> None:
         self.name = "standard input" if path == "-" else path
+        self._fd: int | None = None
         try:
-            self._fd = (
-                os.dup(sys.stdin.fileno())
-                if path == "-"
-                else os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-            )
-        except (OSError, ValueError) as error:
+            if path == "-":
+                self._fd = os.dup(sys.stdin.fileno())
+            elif not os.access(path, os.R_OK):
+                raise PermissionError(errno.EACCES, "Permission denied")
+        except (AttributeError, OSError, ValueError) as error:  # there may be no standard input
             raise DeviceError(f"{self.name}: cannot read it ({error})") from None
-        self._begun = path == "-"
+        self._read: queue.Queue[bytes | OSError] = queue.Queue(maxsize=1)
+        self._closed = threading.Event()
+        threading.Thread(target=self._forward, args=(path,), daemon=True).start()
+
+    def _forward(self, path: str) -> None:
+        """Read until the end, which is empty, or until it is closed."""
+        try:
+            fd = os.open(path, os.O_RDONLY) if self._fd is None else self._fd
+            try:
+                data = b" "
+                while data and not self._closed.is_set():
+                    data = os.read(fd, CHUNK)
+                    self._put(data)
+            finally:
+                os.close(fd)
+        except OSError as error:
+            self._put(error)
+
+    def _put(self, item: bytes | OSError) -> None:
+        while not self._closed.is_set():
+            with suppress(queue.Full):
+                self._read.put(item, timeout=0.2)
+                return
 
     def read(self, timeout_s: float) -> bytes:
+        if self.ended:
+            return b""
         try:
-            ready, _, _ = select.select([self._fd], [], [], timeout_s)
-            if not ready:
-                return b""
-            data = os.read(self._fd, CHUNK)
-        except (OSError, ValueError) as error:
-            raise DeviceError(f"{self.name}: is gone ({error})") from None
-        self._begun = self._begun or bool(data)
-        self.ended = self._begun and not data
-        return data
+            item = self._read.get(timeout=max(timeout_s, 1e-3))
+        except queue.Empty:
+            return b""
+        if isinstance(item, OSError):
+            self.ended = True
+            raise DeviceError(f"{self.name}: is gone ({item})")
+        self.ended = not item
+        return item
 
     def close(self) -> None:
-        if self._fd >= 0:
-            with suppress(OSError):
-                os.close(self._fd)
-            self._fd = -1
+        self._closed.set()
 
 
 class SocketLines(LinePort):

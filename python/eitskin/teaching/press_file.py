@@ -1,15 +1,13 @@
 """The presses of a session on disk, saved as they are made."""
 
-import os
 from dataclasses import replace
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.errors import FileError, FrameError
-from eitskin.fileio import followed, locked, write_beside
+from eitskin.fileio import Claim, followed, write_beside
 from eitskin.skin.protocol import Protocol, pattern_name
 from eitskin.teaching.plan import PressPlan
 from eitskin.teaching.presses import Presses, joined, load_presses, write_presses
@@ -20,8 +18,7 @@ SAME_PLACE_MM = 0.02
 class PressFile:
     """The file is complete after each press: a session that was killed can continue where it
     stopped. With ``start_again`` the first press overwrites an earlier file. ``following`` is the
-    place after the last recorded one. The file is locked against other recorders until it is
-    closed.
+    place after the last recorded one. Other recorders are kept out until it is closed.
 
     Raises:
     FrameError: an earlier file has another protocol, or places that are not in the plan.
@@ -38,15 +35,12 @@ class PressFile:
         start_again: bool = False,
     ) -> None:
         self.path, self.plan, self.protocol, self.skin = path, plan, protocol, skin
-        self._locked: IO[bytes] | None = None
+        self._claim: Claim | None = None
+        self._saved: tuple[int, int, int] | None = None
         self.numbers: list[int] = []
         if path.is_file():
-            self._locked = path.open("rb")
-            if not locked(self._locked):
-                self.close()
-                raise FileError(
-                    f"{path}: another process records to it; stop that, or name another file"
-                )
+            self._claim = Claim(path)
+            self._saved = _version(path)
         try:
             self.presses = load_presses(path) if path.exists() and not start_again else None
             self._find_places()
@@ -55,9 +49,9 @@ class PressFile:
             raise
 
     def close(self) -> None:
-        """Release the lock. It may be called twice."""
-        if self._locked is not None:
-            self._locked.close()
+        """Let others write the file. It may be called twice."""
+        if self._claim is not None:
+            self._claim.release()
 
     def _find_places(self) -> None:
         path, plan, protocol = self.path, self.plan, self.protocol
@@ -99,27 +93,17 @@ class PressFile:
         self.numbers.append(number)
 
     def _save(self, presses: Presses) -> None:
-        """Write the presses; the new file is locked before it gets its name."""
-        if self.path.is_file():
-            ours = self._locked is not None and os.path.samestat(
-                self.path.stat(), os.fstat(self._locked.fileno())
+        """Write the presses."""
+        if self.path.is_file() and _version(self.path) != self._saved:
+            raise FileError(
+                f"{self.path}: another program changed it meanwhile, and this press was not"
+                " saved; name another file"
             )
-            if not ours:
-                raise FileError(
-                    f"{self.path}: another program changed it meanwhile, and this press was not"
-                    " saved; name another file"
-                )
-        with write_beside(self.path) as temporary:
-            stream = temporary.open("wb")
-            try:
-                locked(stream)
-                write_presses(stream, presses)
-                stream.flush()
-            except BaseException:
-                stream.close()
-                raise
-        self.close()
-        self._locked = stream
+        if self._claim is None:
+            self._claim = Claim(self.path)
+        with write_beside(self.path) as temporary, temporary.open("wb") as stream:
+            write_presses(stream, presses)
+        self._saved = _version(self.path)
 
     def back(self) -> int:
         """Remove the last press; return its place, or 0 if there was none."""
@@ -134,6 +118,12 @@ class PressFile:
             if self.path.is_file():
                 followed(self.path).unlink()
         return number
+
+
+def _version(path: Path) -> tuple[int, int, int]:
+    """Return what changes when another program writes the file."""
+    found = path.stat()
+    return found.st_ino, found.st_mtime_ns, found.st_size
 
 
 def _known(values: FloatArray) -> FloatArray | None:

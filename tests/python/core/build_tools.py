@@ -1,10 +1,11 @@
 """The compiler and its kin, for tests that build the C core themselves."""
 
-import fcntl
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+
+from filelock import FileLock
 
 ROOT = Path(__file__).resolve().parents[3]
 CSRC = ROOT / "csrc"
@@ -46,8 +47,7 @@ def build_core() -> Path:
     cmake, ninja = tool("cmake"), tool("ninja")
     tool("cc", "gcc", "clang")
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with FileLock(folder / "lock"):
         run(cmake, "-S", ROOT, "--preset", "host", f"-DCMAKE_MAKE_PROGRAM={ninja}")
         run(cmake, "--build", folder, "--target", "eitskin_f32", "eitskin_f64")
     return folder

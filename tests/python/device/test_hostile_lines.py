@@ -132,7 +132,6 @@ class Disk:
             return Limited(file) if mode == "xb" else file
 
         monkeypatch.setattr(Path, "open", limited)
-        monkeypatch.setattr(new_file, "locked", lambda file: True)
 
 
 def test_a_torn_write_is_taken_back(monkeypatch, tmp_path):

@@ -153,3 +153,10 @@ def test_the_studies_import_nothing_of_the_products_tests():
     ours -= {path.stem for path in (ROOT / "studies" / "tests").glob("*.py")}
     assert {name: used & ours for name, used in packages_imported(ROOT / "studies").items()
             if used & ours} == {}  # fmt: skip
+
+
+def test_the_package_imports_nothing_that_only_unix_has():
+    """Locks, terminals and ports are those of filelock, pyserial and the portable library."""
+    unix = {"fcntl", "termios", "tty", "pty", "select", "resource", "grp", "pwd", "syslog"}
+    found = packages_imported(ROOT / "python") | packages_imported(ROOT / "firmware")
+    assert found and [name for name, used in found.items() if used & unix] == []

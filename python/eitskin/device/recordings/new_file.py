@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import IO
 
 from eitskin.errors import FileError
-from eitskin.fileio import followed, locked, replace_by, sync_folder
+from eitskin.fileio import Claim, followed, replace_by, sync_folder
 
 SYNC_S = 1.0
 MAX_WAITING = 8 << 20  # bytes that wait for room on a full disk
@@ -24,41 +24,51 @@ class RecordingFile:
 
     def __init__(self, path: Path, first: bytes, *, overwrite: bool) -> None:
         self._path = path
+        self._claim: Claim | None = None
         target = followed(path)
         try:
             if target.exists() and not target.is_file():
                 self._file: IO[bytes] = target.open("wb", buffering=0)
                 self.write(first)
             elif overwrite and target.exists():
-                self._replace(target, first)
+                self._claim = Claim(path)
+                self._file = self._replaced(target, first)
             else:
                 self._file = target.open("xb", buffering=0)
-                locked(self._file)
+                self._claim = Claim(path)
                 self.write(first)
                 sync_folder(target)
         except FileExistsError:
             raise FileError(f"{path}: exists already; name another file, or remove it") from None
         except OSError as error:
+            self._release()
             raise FileError(f"{path}: cannot write it ({error.strerror})") from None
+        except FileError:
+            self._release()
+            raise
         self._synced = time.monotonic()
         self._syncing: threading.Thread | None = None
 
-    def _replace(self, target: Path, first: bytes) -> None:
-        with target.open("rb") as old:
-            if not locked(old):
-                raise FileError(
-                    f"{self._path}: another process records to it; stop that, or name another file"
-                )
+    def _replaced(self, target: Path, first: bytes) -> IO[bytes]:
+        """Put a file that begins with ``first`` in the place of ``target``, and open it at its end.
+        It is closed meanwhile, since Windows renames no open file."""
         handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
         self._file = os.fdopen(handle, "wb", buffering=0)
         try:
-            locked(self._file)
             self.write(first)
+            self._file.close()
             replace_by(Path(name), target)
         except BaseException:
             self._file.close()
             Path(name).unlink(missing_ok=True)
             raise
+        file = target.open("r+b", buffering=0)
+        file.seek(0, os.SEEK_END)
+        return file
+
+    def _release(self) -> None:
+        if self._claim is not None:
+            self._claim.release()
 
     def write(self, data: bytes) -> None:
         """Append ``data`` whole, or nothing of it."""
@@ -107,6 +117,7 @@ class RecordingFile:
             self._syncing.join()
         self._sync()
         self._file.close()
+        self._release()
 
 
 class WaitingFile:
