@@ -77,7 +77,8 @@ def stream(
         record: a new recording of every packet.
         zones: a file of named places, whose presses are reported (docs/guide/gestures.md).
         speed: of what is simulated, emulated or recorded; 1 is as it was, 0 as fast as it can.
-        name: of the board, skin or source in every message (None: the URL's, or a serial number).
+        name: of the board, skin or source in every message (None: the URL's, else the
+            one in the board's settings, else its serial number).
         solver: ``sign``, ``iterations``, ``track`` and what else SolverSettings has.
 
     Raises:

@@ -20,7 +20,7 @@
 #define FAKE_ROWS      4096
 #endif
 
-enum { FAKE_SPI_LOG = 64, FAKE_EVENTS = 256, FAKE_PAGE = 256 /* eight records */ };
+enum { FAKE_SPI_LOG = 64, FAKE_EVENTS = 256, FAKE_PAGE = 1024 /* eight records */ };
 
 typedef enum fake_kind { FAKE_SPI, FAKE_LINES } fake_kind;
 

@@ -33,10 +33,16 @@ static void run_alive(uint32_t ms)
     }
 }
 
+static eits_packet_reply set_named(uint32_t settings, uint32_t limit_ua, const char *name)
+{
+    eits_command_settings c = {0, settings, limit_ua, {0}};
+    memcpy(c.name, name, strlen(name));
+    return host_command(&b.host, EITS_PACKET_SETTINGS, &c, sizeof c);
+}
+
 static eits_packet_reply set(uint32_t settings, uint32_t limit_ua)
 {
-    eits_command_settings c = {0, settings, limit_ua};
-    return host_command(&b.host, EITS_PACKET_SETTINGS, &c, sizeof c);
+    return set_named(settings, limit_ua, "");
 }
 
 TEST(test_off_until_asked)
@@ -159,37 +165,73 @@ TEST(test_lock)
     }
 }
 
+/* A name that cannot be a part of topics and addresses is refused and changes nothing; another one
+ * is in INFO, also after a restart, and goes where none is given. */
+TEST(test_name)
+{
+    start_unheard();
+    CHECK_EQUAL(host_info(&b.host).name[0], 0);
+    const char longest[] = "0123456789-abcdefghij_KLMNOPQRST";
+    TAKEN(set_named(EITS_SETTING_SENSE, 400, longest));
+    bench_restart(&b);
+    const char *const refused[] = {"a b", "-a", "_a", "a/b", "a.b", "a#", "\xc3\xa4", "a\n", "~"};
+    for (size_t k = 0; IN_TABLE(k, refused); ++k) {
+        CASE(refused[k]);
+        const eits_packet_reply reply = set_named(0, 0, refused[k]);
+        CHECK_EQUAL(reply.status, EITS_REPLY_RANGE);
+        CHECK_EQUAL(reply.detail[0], offsetof(eits_command_settings, name));
+    }
+    eits_command_settings behind = {0, 0, 0, "a"};
+    behind.name[EITS_NAME_CHARACTERS - 1] = 'b'; /* not zero-filled */
+    CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SETTINGS, &behind, sizeof behind).status,
+                EITS_REPLY_RANGE);
+    const eits_packet_info info = host_info(&b.host);
+    CHECK(memcmp(info.name, longest, sizeof info.name) == 0);
+    CHECK_EQUAL(info.settings, EITS_SETTING_SENSE);
+    CHECK_EQUAL(info.current_limit_ua_rms, 400);
+    TAKEN(set(0, 0));
+    CHECK_EQUAL(host_info(&b.host).name[0], 0);
+}
+
+static fw_status save(const fw_store *store, uint32_t settings)
+{
+    fw_owner_record wanted = {.settings = settings, .current_limit_ua_rms = 100 + settings};
+    wanted.name[EITS_NAME_CHARACTERS - 1] = (char)settings;
+    return fw_owner_record_save(store, &wanted);
+}
+
 /* Power is cut at any write while settings change, also when a page is full and erased: afterwards
  * the old settings or the new ones are valid. */
 TEST(test_cuts)
 {
     static fw_store store; /* not in registers that longjmp forgets */
     static volatile uint32_t step, saved;
-    for (step = 1; step < 60; ++step) {
+    for (step = 1; step < 240; ++step) {
         fake_init(&b.board, 0);
         store = b.board.board.store;
         uint32_t done = 0;
         for (; done < 7; ++done)
-            CHECK_EQUAL(fw_owner_record_save(&store, done, 100 + done), FW_OK);
+            CHECK_EQUAL(save(&store, done), FW_OK);
         b.board.cut_at = b.board.flash_steps + step;
         saved = done;
         if (setjmp(b.board.cut) == 0) {
             for (; saved < 14; ++saved)
-                (void)fw_owner_record_save(&store, saved, 100 + saved);
+                (void)save(&store, saved);
         }
         b.board.cut_at = 0;
         const fw_owner_record kept = fw_owner_record_load(&store);
         CHECK(kept.magic == FW_OWNER_RECORD_MAGIC &&
-              kept.current_limit_ua_rms == 100 + kept.settings);
+              kept.current_limit_ua_rms == 100 + kept.settings &&
+              kept.name[EITS_NAME_CHARACTERS - 1] == (char)kept.settings);
         CHECK(kept.settings + 1 == saved || kept.settings == saved);
         for (uint32_t more = 20; more < 40; ++more) { /* later changes work */
-            CHECK_EQUAL(fw_owner_record_save(&store, more, 100 + more), FW_OK);
+            CHECK_EQUAL(save(&store, more), FW_OK);
             CHECK_EQUAL(fw_owner_record_load(&store).settings, more);
         }
         CHECK_EQUAL(b.board.rewrites, 0);
     }
     store.page_bytes = 0;
-    CHECK_EQUAL(fw_owner_record_save(&store, 1, 1), FW_E_RANGE);
+    CHECK_EQUAL(save(&store, 1), FW_E_RANGE);
     CHECK_EQUAL(fw_owner_record_load(&store).magic, 0);
 }
 

@@ -232,6 +232,7 @@ static void check_lock(const fw_instrument *before)
         return;
     MUST(now->safety.owner.settings == before->safety.owner.settings);
     MUST(now->safety.owner.current_limit_ua_rms == before->safety.owner.current_limit_ua_rms);
+    MUST(memcmp(now->safety.owner.name, before->safety.owner.name, EITS_NAME_CHARACTERS) == 0);
     MUST(now->link.upload.begun <= before->link.upload.begun);
     MUST(now->acquire.settings.excitation_millihz >= before->acquire.settings.excitation_millihz);
 }
@@ -304,7 +305,8 @@ static size_t usual(uint8_t type, uint8_t *payload)
     case EITS_PACKET_GET_STATS:
         USUAL(eits_command_get_stats, .reset = 1);
     case EITS_PACKET_SETTINGS:
-        USUAL(eits_command_settings, .settings = EITS_SETTING_LOCKED | EITS_SETTING_SENSE);
+        USUAL(eits_command_settings, .settings = EITS_SETTING_LOCKED | EITS_SETTING_SENSE,
+              .name = "left");
     case EITS_PACKET_MASK_ROW:
         USUAL(eits_command_mask_row, .row = 2, .masked = 1);
     default:

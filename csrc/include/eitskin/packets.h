@@ -20,6 +20,8 @@ extern "C" {
 #define EITS_LINK_MAX_PAYLOAD 16384u
 /* Of SETTINGS: the limit stays as it is. */
 #define EITS_LIMIT_KEPT       0xFFFFFFFFu
+/* The most characters of a board's name. */
+#define EITS_NAME_CHARACTERS  32u
 
 /* Below 0x80 from the board, from there on to it. */
 typedef enum eits_packet_type {
@@ -220,7 +222,7 @@ typedef enum eits_stream {
     EITS_STREAM_DRIVE_TOUCHES = 16
 } eits_stream;
 
-/* The board, its model and its settings. */
+/* The board, its model and its settings. Fields are added at its end. */
 typedef struct eits_packet_info {
     /* of the GET_INFO that asked; 0 after a restart */
     uint32_t request;
@@ -297,6 +299,8 @@ typedef struct eits_packet_info {
     uint32_t current_ua_rms;
     /* above which the drive goes off; 0: none */
     uint32_t current_limit_ua_rms;
+    /* that the owner gave the board, zero-filled; empty: none */
+    char name[32];
 } eits_packet_info;
 
 /* The result of the command with this request number. */
@@ -708,6 +712,8 @@ typedef struct eits_command_settings {
     uint32_t settings;
     /* at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1: as it is */
     uint32_t current_limit_ua_rms;
+    /* letters, digits, - and _, the first a letter or digit; zero-filled; empty: none */
+    char name[32];
 } eits_command_settings;
 
 /* SHA-256 of what the board's flash holds. */

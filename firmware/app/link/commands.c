@@ -340,12 +340,18 @@ static fw_answer on_settings(fw_host_link *link, const void *payload, size_t siz
         outside(&bad, offsetof(eits_command_settings, current_limit_ua_rms), c.current_limit_ua_rms,
                 0, MAX_UA_RMS))
         return bad;
+    if (!fw_owner_name_valid(c.name))
+        return fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_settings, name),
+                         EITS_NAME_CHARACTERS);
     if (fw_owner_refuses(link->safety, EITS_PACKET_SETTINGS))
         return locked();
     if (fw_current_state(link->safety) !=
         EITS_DRIVE_TRIPPED) /* erasing the flash may take seconds */
         fw_current_off(link->safety, EITS_DRIVE_OFF);
-    if (fw_owner_save(link->safety, c.settings, c.current_limit_ua_rms) != FW_OK)
+    fw_owner_record wanted = {.settings = c.settings,
+                              .current_limit_ua_rms = c.current_limit_ua_rms};
+    memcpy(wanted.name, c.name, sizeof wanted.name);
+    if (fw_owner_save(link->safety, &wanted) != FW_OK)
         return fw_refuse(EITS_REPLY_FLASH, 0, 0);
     if ((c.settings & EITS_SETTING_KEEP_CURRENT) != 0)
         (void)fw_current_on(link->safety);

@@ -78,6 +78,7 @@ void fw_send_info(fw_host_link *link, uint32_t request)
     report_scan(link, &info);
     copy_text(info.board, sizeof info.board - 1, board->name);
     copy_text(info.serial, sizeof info.serial, board->serial);
+    copy_text(info.name, sizeof info.name, fw_owner_name(safety));
     report_model(link, &info);
     (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_INFO, &info, sizeof info, NULL, 0);
 }

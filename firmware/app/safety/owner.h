@@ -2,6 +2,7 @@
 #ifndef FW_OWNER_H
 #define FW_OWNER_H
 
+#include "app/safety/owner_record.h"
 #include "eitskin/link.h"
 #include "hal/hal.h"
 
@@ -16,11 +17,18 @@ bool fw_owner_keeps_current(const fw_safety *safety);
 /* The owner's own limit of the current, rms; 0: the owner has set none. */
 uint32_t fw_owner_current_limit_ua(const fw_safety *safety);
 
+/* The board's name, EITS_NAME_CHARACTERS long and zero-filled; empty: it has none. */
+const char *fw_owner_name(const fw_safety *safety);
+
+/* Whether `name`, EITS_NAME_CHARACTERS long, is empty, or letters, digits, - and _ with a letter or
+ * digit first, and zero-filled behind. So it can be a part of topics and addresses. */
+bool fw_owner_name_valid(const char *name);
+
 /* Whether the board is locked and the owner does not hold its button; raises LOCKED then. `command`
  * is what the host asked for. */
 bool fw_owner_refuses(fw_safety *safety, eits_packet_type command);
 
 /* Store new settings and use them. Errors: as fw_owner_record_save. */
-fw_status fw_owner_save(fw_safety *safety, uint32_t settings, uint32_t current_limit_ua_rms);
+fw_status fw_owner_save(fw_safety *safety, const fw_owner_record *wanted);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-_Static_assert(sizeof(fw_owner_record) == FW_OWNER_RECORD_BYTES, "a record is 32 bytes");
+_Static_assert(sizeof(fw_owner_record) == FW_OWNER_RECORD_BYTES, "a record has its size");
 
 typedef struct place {
     uint32_t page, slot; /* the first erased slot behind the latest record */
@@ -58,8 +58,7 @@ fw_owner_record fw_owner_record_load(const fw_store *store)
     return find(store, &next);
 }
 
-fw_status fw_owner_record_save(const fw_store *store, uint32_t settings,
-                               uint32_t current_limit_ua_rms)
+fw_status fw_owner_record_save(const fw_store *store, const fw_owner_record *wanted)
 {
     place next;
     const fw_owner_record latest = find(store, &next);
@@ -71,10 +70,9 @@ fw_status fw_owner_record_save(const fw_store *store, uint32_t settings,
         if (status != FW_OK)
             return status;
     }
-    fw_owner_record one = {.magic = FW_OWNER_RECORD_MAGIC,
-                           .generation = latest.generation + 1u,
-                           .settings = settings,
-                           .current_limit_ua_rms = current_limit_ua_rms};
+    fw_owner_record one = *wanted;
+    one.magic = FW_OWNER_RECORD_MAGIC;
+    one.generation = latest.generation + 1u;
     one.crc = eits_crc32(0, &one, FW_OWNER_RECORD_BYTES - 4u);
     return store->ops->program(store->ctx, FW_BANKS + next.page, next.slot * FW_OWNER_RECORD_BYTES,
                                &one, sizeof one);

@@ -37,7 +37,7 @@ from eitskin_emulator.schedule import Schedule
 from eitskin_emulator.serial_line import SerialLine
 
 # the owner's settings (firmware/app/safety/owner_record.h, two sectors of 256 KB)
-PAGES, PAGES_BYTES, RECORD_BYTES, MAGIC = 0x08140000, 0x80000, 32, 0x54455345
+PAGES, PAGES_BYTES, RECORD_BYTES, MAGIC = 0x08140000, 0x80000, 128, 0x32455345
 FSYNC_PIN, ENABLE_PIN, MCO_PIN, ADC_PIN, SENSE_PIN = 2, 12, 8, 3, 0
 SCK_PIN, MOSI_PIN, TX_PIN, RX_PIN = 10, 12, 8, 9
 MCO_FUNCTION, SPI3_FUNCTION, USART3_FUNCTION = 0, 6, 7

@@ -1,11 +1,12 @@
-"""``eitskin board``: show or change the settings that belong to the board's owner: lock, current,
-limit."""
+"""``eitskin board``: show or change the settings that belong to the board's owner: name, lock,
+current, limit."""
 
 import argparse
 
 from eitskin.cli.arguments import option
 from eitskin.cli.device_options import add_device, open_named
 from eitskin.cli.printing import answer, table
+from eitskin.device.timing import check_name
 from eitskin.device.wire.link_table import Setting
 
 SETTINGS = (  # bits of eits_setting, each with the option that sets it and the one that clears it
@@ -33,6 +34,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " locked board accepts changes only while its blue button is held."
     )
     add_device(parser)
+    named = parser.add_mutually_exclusive_group()
+    named.add_argument(
+        "--name",
+        metavar="NAME",
+        type=lambda text: check_name(text, "--name"),
+        help="the board's name in messages, topics, frames and the TUIO source",
+    )
+    named.add_argument(
+        "--no-name", dest="name", action="store_const", const="", help="the board has no name"
+    )
     for name, (on, text), (off, contrary) in SETTINGS:
         either = parser.add_mutually_exclusive_group()
         for flag, value, meaning in ((on, True, text), (off, False, contrary)):
@@ -57,10 +68,16 @@ def run(options: argparse.Namespace) -> int:
             named = getattr(options, name)
             if named is not None:
                 wanted = wanted | Setting[name] if named else wanted & ~Setting[name]
-        if wanted != info.settings or options.limit_ua is not None:
-            info = device.settings(wanted, options.limit_ua)
+        changed = options.name not in (None, info.name)
+        if changed or wanted != info.settings or options.limit_ua is not None:
+            info = device.settings(wanted, options.limit_ua, options.name)
         url = device.transport.url
-    facts = {"settings": info.setting_names, "current_limit_ua_rms": info.current_limit_ua_rms}
+    facts = {
+        "name": info.name,
+        "settings": info.setting_names,
+        "current_limit_ua_rms": info.current_limit_ua_rms,
+    }
     limit = f"{info.current_limit_ua_rms} uA rms" if info.current_limit_ua_rms else "none"
-    shown = {"device": url, "settings": ", ".join(info.setting_names) or "none", "limit": limit}
+    kept = ", ".join(info.setting_names) or "none"
+    shown = {"device": url, "name": info.name or "none", "settings": kept, "limit": limit}
     return answer(options, {"device": url, **facts}, table(shown))

@@ -50,9 +50,10 @@ def _line(found: FoundPort) -> str:
     described = "" if port.description in ("", "n/a") else f"  {port.description}"
     line = f"serial:{port.path}{described}{usb}: "
     if found.board is not None:
+        named = f", name {found.board.name}" if found.board.name else ""
         return (
             f"{line}{found.board.board}, firmware {found.board.firmware_text}, serial"
-            f" {found.board.serial}"
+            f" {found.board.serial}{named}"
         )
     if found.why is not None:
         return f"{line}{found.why}"

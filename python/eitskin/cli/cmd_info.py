@@ -43,6 +43,7 @@ def run(options: argparse.Namespace) -> int:
 def _facts(info: BoardInfo, url: str) -> dict[str, Any]:
     facts = {"device": url, "board": info.board, "firmware": info.firmware_text}
     facts["serial"] = info.serial
+    facts["name"] = info.name or "none; give one with  eitskin board --name NAME"
     facts["processor"] = f"{info.f_cpu_hz / 1e6:g} MHz" if info.f_cpu_hz else "none (simulated)"
     if info.has_model:
         storage = STORAGES[info.storage] if info.storage < len(STORAGES) else info.storage

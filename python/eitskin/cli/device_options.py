@@ -187,7 +187,8 @@ def add_name(parser: argparse.ArgumentParser) -> None:
         parser,
         "--name NAME",
         "name of this board, skin or source in messages, topics, frames and the TUIO source"
-        " (default: name=NAME in the device's URL, else the board's serial number)",
+        " (default: name=NAME in the device's URL, else the name in the board's settings, else its"
+        " serial number)",
     )
 
 

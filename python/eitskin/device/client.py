@@ -11,6 +11,7 @@ from eitskin.device.exchange import ANSWER_S, CommandExchange
 from eitskin.device.link import Streamed
 from eitskin.device.pacing import Pacer
 from eitskin.device.streaming import LEAVE_S, packet_stream
+from eitskin.device.timing import check_name
 from eitskin.device.upload import upload
 from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.link_table import Setting, Stream
@@ -159,18 +160,24 @@ class Device(CommandExchange):
         assert isinstance(answer, BoardHashes)
         return answer
 
-    def settings(self, settings: Setting, current_limit_ua_rms: int | None = None) -> BoardInfo:
+    def settings(
+        self,
+        settings: Setting,
+        current_limit_ua_rms: int | None = None,
+        name: str | None = None,
+    ) -> BoardInfo:
         """Give the board all of its owner's settings, which it keeps in flash; the current stops.
         The limit counts where a sense resistor is fitted; 0: 1.25 times what the source gives,
-        None: as it is.
+        None: as it is. ``name`` is the board's, in messages and topics; "": none, None: as it is.
 
         Raises:
-            UsageError: the limit does not fit.
+            UsageError: the limit does not fit, or the name cannot be used.
             DeviceError: the board is locked and nobody holds its button, or keeps no settings.
         """
         limit = commands.LIMIT_KEPT if current_limit_ua_rms is None else current_limit_ua_rms
         with self.asking:
-            self.command(commands.Settings(int(settings), limit), 10.0)
+            named = self.board.name if name is None else name and check_name(name, "name")
+            self.command(commands.Settings(int(settings), limit, named), 10.0)
             return self.info()
 
     def clear_faults(self) -> None:

@@ -37,13 +37,18 @@ def split_name(url: str) -> tuple[str, str | None]:
     return bare + ("?" + rest if rest else ""), check_name(names[0], f"device {url!r}")
 
 
+def is_name(text: str) -> bool:
+    """Whether ``text`` can name a board, skin or source."""
+    return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", text) is not None
+
+
 def check_name(name: str, where: str) -> str:
     """``name`` of a board, skin or source, which becomes a part of topics and addresses.
 
     Raises:
         UsageError: it has other characters, or too many.
     """
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", name):
+    if not is_name(name):
         raise UsageError(
             f"{where}: name {name!r} cannot be used; use 1 to 32 letters, digits, - and _, as in"
             " left-arm"

@@ -161,7 +161,9 @@ class PageCommands:
                 )
                 self._changed(session, lambda device: self._end_recording(session))
 
-            session.recorder = Recorder(path, device, session.solver, failed=failed)
+            session.recorder = Recorder(
+                path, device, session.solver, name=session.given_name, failed=failed
+            )
             return f"recording to {path.name}"
 
         return self._changed(session, action)

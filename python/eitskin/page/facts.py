@@ -60,6 +60,7 @@ def setup_text(session: Session, may_command: bool) -> str:
         "url": session.url,
         "board": board.board,
         "serial": board.serial,
+        "name": session.given_name or "",
         "replays": session.replays,
         "timed": session.timed,
         "electrodes": board.n_electrodes,

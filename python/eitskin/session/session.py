@@ -25,7 +25,7 @@ from eitskin.device.pacing import Pacer, Slowness, WallClock
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.streaming import LEAVE_S, STOP_S, packet_stream
-from eitskin.device.timing import check_name, check_speed, split_name, split_timing
+from eitskin.device.timing import check_name, check_speed, is_name, split_name, split_timing
 from eitskin.device.transport import Capabilities
 from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.session.assemble import Assembler, Clock
@@ -65,7 +65,8 @@ class Session:
     while the board is unplugged.
 
     Attributes:
-        given_name: the name of the source that the settings or the URL give; None: none.
+        given_name: the name of the source that the settings, the URL or the board give, in this
+            order; None: none.
         device, known: the board and its model, where the host has that.
         mode: what is streamed.
         observer: who adds to frames what is known of them; None: nobody.
@@ -132,6 +133,8 @@ class Session:
             self._requests.close(str(error))
             self.device.close()
             raise
+        if self.given_name is None and is_name(self.device.board.name):
+            self.given_name = self.device.board.name
         return self
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
@@ -158,7 +161,8 @@ class Session:
 
     @property
     def source(self) -> str:
-        """The name of the source in every message: as given, else the board's serial number."""
+        """The name of the source in every message: the one given, else the board's serial
+        number."""
         return self.given_name or self.device.board.serial
 
     @property
@@ -428,7 +432,9 @@ class Session:
         self._watch_start()
         self.solver = set_up(self.device, *self.scan_and_solver(), self.known)
         if how.record is not None:
-            self.recorder = Recorder(how.record, self.device, self.solver, overwrite=True)
+            self.recorder = Recorder(
+                how.record, self.device, self.solver, name=self.given_name, overwrite=True
+            )
         self._take_reference()
         began_us, meanwhile = begin_scene(self.device)
         self.device.transport.watch(None)

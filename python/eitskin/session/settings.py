@@ -46,8 +46,8 @@ class SessionSettings:
         zones: named places that fingers press (``eitskin.session.zones``).
         preset: a preset that chooses the solver's settings.
         record: a new recording of every packet; an existing file is written over.
-        name: of the board, skin or source, in every message; None: the URL's, else the board's
-            serial number.
+        name: of the board, skin or source, in every message; None: the URL's, else the one
+            in the board's settings, else the board's serial number.
         quiet_frames: the untouched frames of the reference are sent too, and their mean is kept.
     """
 

@@ -31,7 +31,7 @@ PROTOCOL = adjacent(8)
 
 
 def board() -> BoardInfo:
-    text = {"board": "fake", "serial": "1"}
+    text = {"board": "fake", "serial": "1", "name": "left"}
     values = {one.name: 1 for one in fields(BoardInfo)} | text | {"firmware": (0, 1, 0)}
     hashed = {
         "n_electrodes": 8, "n_rows": ROWS, "protocol_hash": PROTOCOL.hash, "electrodes": 16,

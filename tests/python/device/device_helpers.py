@@ -147,7 +147,7 @@ def board_info(**changes: object) -> BoardInfo:
         "check_every": 1, "streaming": 0, "every": 1,
         "tared": 0, "frame_period_us": 0, "faults": 0, "volts_per_code_nv": 805664,
         "drive": 0, "settings": 0, "source_ua_rms": 350, "current_ua_rms": 0,
-        "current_limit_ua_rms": 437,
+        "current_limit_ua_rms": 437, "name": "left",
     }  # fmt: skip
     return BoardInfo(**(values | changes))
 

@@ -102,7 +102,13 @@ def test_enums_are_the_headers(enum, name, prefix):
 
 def test_stages_and_limits_are_the_headers():
     lib = core.lib
-    for name in ("LINK_VERSION", "LINK_MAX_PAYLOAD", "FAULT_RAISE_FRAMES", "FAULT_CLEAR_FRAMES"):
+    for name in (
+        "LINK_VERSION",
+        "LINK_MAX_PAYLOAD",
+        "FAULT_RAISE_FRAMES",
+        "FAULT_CLEAR_FRAMES",
+        "NAME_CHARACTERS",
+    ):
         assert getattr(link, name) == getattr(lib, f"EITS_{name}")
     assert len(link.STAGES) == lib.EITS_STAGES
     number = core.ffi.typeof("eits_stage").relements
@@ -127,6 +133,14 @@ def test_info_is_read_as_it_was_built():
     assert info.frame_us == 20800
     assert board_info(check_every=0).frame_us == 10400
     assert board_info(frame_period_us=50000).frame_us == 50000
+
+
+def test_info_grows_at_its_end():
+    """An older board has no name; a newer one sends more."""
+    payload = pl.pack(board_info())
+    older = pl.parse(link.PacketType.INFO, payload[: pl.OLDEST_INFO_BYTES])
+    assert older == board_info(name="")
+    assert pl.parse(link.PacketType.INFO, payload + b"more") == board_info()
 
 
 words = st.integers(0, 2**32 - 1)
@@ -161,7 +175,7 @@ def solved(count: int, status: int = 0) -> pk.Solved:
 @pytest.mark.parametrize("extra", [-1, 1, 4])
 def test_a_payload_of_another_length_is_refused(extra):
     whole = {
-        link.PacketType.INFO: pl.pack(board_info()),
+        link.PacketType.INFO: pl.pack(board_info())[: pl.OLDEST_INFO_BYTES + min(extra, 0)],
         link.PacketType.REPLY: pl.pack(pk.Reply(1, 2, 3)),
         link.PacketType.RAW: build_raw(
             pk.RawFrame(1, 2, 3, 0, np.zeros(4, np.float32), np.zeros(4, np.uint8))
@@ -172,6 +186,8 @@ def test_a_payload_of_another_length_is_refused(extra):
         ),
         link.PacketType.FAULT: pl.pack(pk.Fault(1, True, 1, 1, 1)),
     }
+    if extra > 0:
+        del whole[link.PacketType.INFO]  # it may grow
     for kind, payload in whole.items():
         with pytest.raises(pl.MalformedPacket):
             pl.parse(kind, payload[:extra] if extra < 0 else payload + bytes(extra))

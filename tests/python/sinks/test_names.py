@@ -5,14 +5,16 @@ import socket
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import jsonschema
 import pytest
 
 import eitskin
 from eitskin.cli.main import main
-from eitskin.device.open import open_device
+from eitskin.device.open import open_device, open_with_files
 from eitskin.device.timing import Timing, split_name, split_timing
+from eitskin.device.wire.link_table import Setting
 from eitskin.errors import UsageError
 from eitskin.session.message import schema
 from eitskin.session.session import Session
@@ -52,6 +54,62 @@ def test_without_a_name_it_is_the_serial_number(capsys):
     assert {message["source"] for message in printed(capsys, "--device", "sim:swipe")} == {serial}
     (frame,) = eitskin.stream("sim:swipe", frames=1, name="arm")
     assert frame.source == "arm" and frame.message()["source"] == "arm"
+
+
+def mcap_messages(path: Path) -> list[tuple[str, str]]:
+    """The topic and the frame of reference of each message."""
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    with path.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        return [(c.topic, m.header.frame_id) for _, c, _, m in reader.iter_decoded_messages()]
+
+
+@pytest.fixture
+def named_board(monkeypatch):
+    """Every board that a session opens has the name that its owner gave it: elbow."""
+
+    def opened(*url, **how):
+        device = open_with_files(*url, **how)
+        if not device.replays:
+            device.settings(Setting(0), name="elbow")
+        return device
+
+    monkeypatch.setattr("eitskin.session.session.open_with_files", opened)
+
+
+def test_the_name_in_the_boards_settings_is_used_where_none_is_given(named_board, tmp_path, capsys):
+    for options, name in (
+        ([], "elbow"),
+        (["--name", "left"], "left"),
+        (["--device", "sim:swipe?name=right"], "right"),
+        (["--device", "sim:swipe?name=right", "--name", "left"], "left"),
+    ):
+        came = printed(capsys, "--device", "sim:swipe", *options)
+        assert {message["source"] for message in came} == {name}
+    assert main(["stream", "--device", "sim:swipe", "--frames", "3", "--to",
+                 f"mcap:{tmp_path}/a.mcap"]) == 0  # fmt: skip
+    assert {frame for _, frame in mcap_messages(tmp_path / "a.mcap")} == {"elbow"}
+    capsys.readouterr()
+    path = tmp_path / "run.eits"
+    for options, name in (([], "elbow"), (["--name", "left"], "left")):
+        assert main(["record", "--device", "sim:swipe", "-o", str(path), "--frames", "2",
+                     "--overwrite", *options]) == 0  # fmt: skip
+        capsys.readouterr()
+        assert {m["source"] for m in printed(capsys, "--device", f"file:{path}")} == {name}
+
+
+def test_a_boards_name_that_cannot_be_is_not_used(monkeypatch):
+    def opened(*url, **how):
+        device = open_with_files(*url, **how)
+        device.board = replace(device.board, name="a/b\x1b[2J")
+        return device
+
+    monkeypatch.setattr("eitskin.session.session.open_with_files", opened)
+    with Session("sim:swipe") as session:
+        assert session.given_name is None
+        assert session.source == session.device.board.serial
 
 
 def test_a_recording_is_made_under_a_name(tmp_path, capsys):
@@ -121,17 +179,12 @@ def test_two_skins_on_one_tuio_port_are_two_sources(names, expected):
 
 
 def test_topics_and_frames_have_the_name(swipe, tmp_path, monkeypatch):
-    from mcap.reader import make_reader
-    from mcap_ros2.decoder import DecoderFactory
-
     source = replace(swipe.source, name="left", source="left")
     with Outputs([f"mcap:{tmp_path}/a.mcap"], source) as outputs:
         for frame in swipe.frames[:3]:
             outputs.put(frame)
         outputs.end({})
-    with (tmp_path / "a.mcap").open("rb") as stream:
-        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-        came = [(c.topic, m.header.frame_id) for _, c, _, m in reader.iter_decoded_messages()]
+    came = mcap_messages(tmp_path / "a.mcap")
     assert ("/left/touches", "left") in came and all(t.startswith("/left/") for t, _ in came)
     assert {frame for _, frame in came} == {"left"}
 

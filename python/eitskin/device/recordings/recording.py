@@ -7,7 +7,7 @@ docs/reference/link-protocol.md, "Recordings", specifies the file.
 import json
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +32,10 @@ LOOKED_THROUGH = 64 * CHUNK  # the note of the solver is among the first packets
 
 class Recorder:
     """Writes every packet that ``device`` receives to the new file ``path`` until it is closed,
-    after the ``options`` that its solver has, so that the host can solve it again. ``packets`` and
-    ``bytes`` count. If writing fails, such as on a full disk, the stream ends with the error; with
-    ``failed`` only the recording ends, and ``failed`` gets the error, in whatever thread.
+    after the ``options`` that its solver has, so that the host can solve it again. The recorded
+    board has the name ``name``, or else the device's. ``packets`` and ``bytes`` count. If writing
+    fails, such as on a full disk, the stream ends with the error; with ``failed`` only the
+    recording ends, and ``failed`` gets the error, in whatever thread.
 
     Raises:
         FileError: the file exists already (with ``overwrite``: is being recorded to), or cannot be
@@ -48,6 +49,7 @@ class Recorder:
         device: Device,
         options: Options | None = None,
         *,
+        name: str | None = None,
         overwrite: bool = False,
         failed: Callable[[FileError], object] | None = None,
     ) -> None:
@@ -55,6 +57,7 @@ class Recorder:
         self._failed, self._over = failed, False
         self.packets = self.bytes = 0
         info = device.board if device.transport.capabilities.replays else device.info()
+        info = replace(info, name=name or info.name)
         head = {
             "format": FORMAT,
             "version": VERSION,

@@ -64,8 +64,9 @@ class Command(Payload):
         """The bytes of its payload.
 
         Raises:
-            struct.error: a field does not fit its width.
+            struct.error: a number does not fit its width.
         """
         values = [getattr(self, one.name) for one in fields(self)]  # type: ignore[arg-type]
         follow = values.pop() if values and isinstance(values[-1], bytes) else b""
+        values = [one.encode("ascii") if isinstance(one, str) else one for one in values]
         return bytes(self.LAYOUT.struct.pack(request, *values) + follow)

@@ -13,6 +13,7 @@ LINK_MAX_PAYLOAD = 16384
 LIMIT_KEPT = 4294967295
 FAULT_RAISE_FRAMES = 3
 FAULT_CLEAR_FRAMES = 8
+NAME_CHARACTERS = 32
 # eits_stage: Stages that are timed.
 STAGES = ("scan", "demodulate", "solve", "touches", "send", "frame")
 Electrodes = Annotated[tuple[int, ...], "Q", "electrodes"]
@@ -28,6 +29,7 @@ Stages = Annotated[dict[str, "StageStats"], "24I", "stages"]
 Stop = Annotated[str, "B", "stop"]
 Text16 = Annotated[str, "16s", "text"]
 Text24 = Annotated[str, "24s", "text"]
+Text32 = Annotated[str, "32s", "text"]
 U16 = Annotated[int, "H", ""]
 U32 = Annotated[int, "I", ""]
 U64 = Annotated[int, "Q", ""]
@@ -174,7 +176,7 @@ class Stream(IntFlag):
 
 @dataclass(frozen=True)
 class InfoPacket(Payload, c="eits_packet_info"):
-    """The board, its model and its settings."""
+    """The board, its model and its settings. Fields are added at its end."""
 
     request: U32  # of the GET_INFO that asked; 0 after a restart
     firmware: Version  # major, minor, patch, 0
@@ -214,6 +216,7 @@ class InfoPacket(Payload, c="eits_packet_info"):
     source_ua_rms: U32  # what the current source gives as built; 0: not known
     current_ua_rms: U32  # as measured last; 0: there is no sense resistor, or no current
     current_limit_ua_rms: U32  # above which the drive goes off; 0: none
+    name: Text32  # that the owner gave the board, zero-filled; empty: none
 
 
 @dataclass(frozen=True)
@@ -516,6 +519,7 @@ class Settings(Command, c="eits_command_settings", kind=PacketType.SETTINGS):
     settings: U32  # bits of eits_setting
     # at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1: as it is
     current_limit_ua_rms: U32
+    name: Text32  # letters, digits, - and _, the first a letter or digit; zero-filled; empty: none
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,8 @@ from eitskin.device.wire.packets import (
     SolvedTouches,
 )
 
+OLDEST_INFO_BYTES = 168  # of the first firmware of this link version
+
 
 class MalformedPacket(ValueError):
     """A packet whose checksum is right but whose payload is not of its type: of a board that does
@@ -126,6 +128,14 @@ def _check_rest(payload: bytes, head: Payload, size: int, what: str) -> None:
         raise MalformedPacket(f"{what}: {len(payload)} bytes, not {expected}")
 
 
+def parse_info(payload: bytes) -> BoardInfo:
+    """An INFO, which grows at its end: what an older board does not send is 0, and what a newer one
+    sends beyond the fields known here is passed over."""
+    if len(payload) >= OLDEST_INFO_BYTES:
+        payload = payload.ljust(BoardInfo.LAYOUT.size, b"\0")
+    return unpack(BoardInfo, payload, "INFO", more=True)
+
+
 def parse_raw(payload: bytes) -> RawFrame:
     head = unpack(RawHead, payload, "RAW", more=True)
     _check_rest(payload, head, 5 * head.n_rows, "RAW")
@@ -180,7 +190,7 @@ def _event(time_us: int, kind: int, phase: int, *rest: float) -> GestureEvent:
 
 _KINDS, _PHASES = frozenset(EventKind), frozenset(EventPhase)
 _PARSERS: dict[int, Callable[[bytes], FromBoard]] = {
-    PacketType.INFO: lambda payload: unpack(BoardInfo, payload, "INFO"),
+    PacketType.INFO: parse_info,
     PacketType.REPLY: lambda payload: unpack(Reply, payload, "REPLY"),
     PacketType.RAW: parse_raw,
     PacketType.IMAGE: parse_image,

@@ -109,7 +109,7 @@ function takeSetup(setup) {
   const before = page.setup;
   page.setup = setup;
   page.report = null;
-  $("device").textContent = `${setup.url} · ${setup.board}, ${setup.electrodes} electrodes`;
+  $("device").textContent = `${setup.name && setup.name + " · "}${setup.url} · ${setup.board}, ${setup.electrodes} electrodes`;
   document.title = `${setup.url} · eitskin`;
   const same = before && before.model_crc === setup.model_crc && before.url === setup.url && Boolean(before.skin) === Boolean(setup.skin);
   if (!same) skin.setSkin(setup.skin);
