@@ -130,7 +130,10 @@ use_environment() {
     export PATH OPENBLAS_NUM_THREADS
 }
 
-# build_site [ARGUMENT]...: the documentation in build/site; what Sphinx warns of, as a broken link or anchor, is an error.
+# build_site NOTEBOOKS [ARGUMENT]...: the documentation in build/site, with notebooks that are run (cache: if they changed; force) or
+# not (off); what Sphinx warns of, as a broken link or anchor, is an error.
 build_site() {
-    python -m sphinx -W --keep-going --quiet -c "$root/docs/site" "$@" "$root" "$root/build/site"
+    notebooks=$1
+    shift
+    python -m sphinx -W --keep-going --quiet -D nb_execution_mode="$notebooks" -c "$root/docs/site" "$@" "$root" "$root/build/site"
 }

@@ -57,7 +57,7 @@ copyright = "The eitskin authors, MIT licence"
 version = release = installed_version("eitskin")
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx_external_toc",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
@@ -69,6 +69,9 @@ include_patterns = ["*.md", "docs/**", "studies/results/**"]
 external_toc_path = "docs/site/_toc.yml"
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
+nb_execution_in_temp = True
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 hawkmoth_root = str(HEADERS)
