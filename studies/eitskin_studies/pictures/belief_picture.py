@@ -5,6 +5,7 @@ from pathlib import Path
 from eitskin.view.panels import save_picture
 from eitskin.view.pictures import FOUND, INK, STYLE, load_matplotlib
 from eitskin_studies.experiments.belief.tables import HIGH, LOW, Sets, coverage, curve
+from eitskin_studies.worlds.worlds import in_words
 
 SMALLEST = 1e-3
 
@@ -42,7 +43,7 @@ def draw_belief(path: Path, sets: Sets) -> None:
         for place, (_, one) in enumerate(covered):
             right.plot([100 * one.low, 100 * one.high], [place, place], color=FOUND, linewidth=1.2)
             right.plot(100 * one.mean, place, "o", color=FOUND, markersize=4)
-        right.set_yticks(range(len(covered)), [name.replace("_", " ") for name, _ in covered])
+        right.set_yticks(range(len(covered)), [in_words(name) for name, _ in covered])
         right.invert_yaxis()
         right.set(xlabel="true places in their 90 % ellipses, %", xlim=(0, 100))
         save_picture(figure, path)

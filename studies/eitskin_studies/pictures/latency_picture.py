@@ -9,11 +9,10 @@ from eitskin.view.pictures import INK, STYLE, load_matplotlib
 from eitskin_studies.benchmarks.latency import Latency
 
 COLOURS = ("#1f5fa8", "#2a9d8f", "#e9a03b", "#b3202c")
-LINES = ("-", "--", ":", "-.")
 
 
 def draw_latency(path: Path, result: Latency) -> None:
-    """A line a rise; methods by the kind of line.
+    """A panel a method, and a line a rise.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -23,25 +22,27 @@ def draw_latency(path: Path, result: Latency) -> None:
     rises = sorted({one.rise_ms for one in result.judged})
     methods = list(dict.fromkeys(one.method for one in result.judged))
     with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(9.5, 4.2), layout="constrained")
-        axes = figure.subplots()
+        size = (2.6 * len(methods) + 0.8, 3.2)
+        figure = matplotlib.figure.Figure(figsize=size, layout="constrained")
+        panels = figure.subplots(1, len(methods), sharex=True, sharey=True, squeeze=False)[0]
         for one in result.judged:
             share = 100 * np.arange(len(one.scan_ms) + 1) / one.presses
-            times = np.sort([0.0, *one.scan_ms])
-            label = f"rise {one.rise_ms} ms" if len(methods) == 1 else None
-            axes.step(
-                times,
+            panels[methods.index(one.method)].step(
+                np.sort([0.0, *one.scan_ms]),
                 share,
                 where="post",
                 color=COLOURS[rises.index(one.rise_ms) % len(COLOURS)],
-                linestyle=LINES[methods.index(one.method) % len(LINES)],
-                label=label or f"{one.rise_ms} ms, {one.method}",
+                label=f"{one.rise_ms} ms",
             )
-        axes.set_xlabel("from the contact to the end of the scan or drive that reports it, ms")
-        axes.set_ylabel("presses reported, %")
-        axes.set_xlim(left=0)
-        axes.set_ylim(0, 102)
-        axes.grid(linewidth=0.4, alpha=0.5)
-        axes.spines[["top", "right"]].set_visible(False)
-        figure.legend(frameon=False, labelcolor=INK, fontsize=8, loc="outside right upper")
+        for axes, method in zip(panels, methods, strict=True):
+            axes.set_title(method, fontsize=9)
+            axes.set_xlim(left=0)
+            axes.set_ylim(0, 102)
+            axes.grid(linewidth=0.4, alpha=0.5)
+            axes.spines[["top", "right"]].set_visible(False)
+        panels[0].set_ylabel("presses reported, %")
+        panels[0].legend(title="rise", frameon=False, labelcolor=INK, fontsize=8, loc="lower right")
+        figure.supxlabel(
+            "from the contact to the end of the scan or drive that reports it, ms", fontsize=9
+        )
         save_picture(figure, path)

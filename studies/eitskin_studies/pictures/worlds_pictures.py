@@ -9,6 +9,7 @@ import numpy as np
 from eitskin.skin.outline import Outline
 from eitskin.view.panels import DPI
 from eitskin.view.pictures import FOUND, INK, RIM, load_matplotlib
+from eitskin_studies.worlds.worlds import in_words
 
 WRONG = "#b2182b"
 FAILS_BELOW = 90.0
@@ -33,7 +34,7 @@ def draw_shares(path: Path, scores: Sequence[Mapping[str, Any]]) -> None:
         left.barh(place, share, color=colour)
         left.plot([low, high], [place, place], color=INK, linewidth=1)
         right.barh(place, one["false_per_scene"], color=colour)
-    left.set_yticks(range(len(rows)), [one["name"].replace("_", " ") for one in rows])
+    left.set_yticks(range(len(rows)), [in_words(one["name"]) for one in rows])
     left.invert_yaxis()
     left.set(xlabel="scenes counted exactly, %", xlim=(0, 100))
     right.set(xlabel="false touches a scene")
@@ -61,6 +62,6 @@ def draw_examples(path: Path, examples: Mapping[str, Mapping[str, Any]], outline
             axes.plot(x + radius * np.cos(turn), y + radius * np.sin(turn), color=FOUND)
         axes.set_aspect("equal")
         axes.set_axis_off()
-        axes.set_title(name.replace("_", " "), fontsize=9)
+        axes.set_title(in_words(name), fontsize=9)
     figure.savefig(path, dpi=DPI)
     plt.close(figure)

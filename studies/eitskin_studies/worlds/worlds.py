@@ -175,3 +175,8 @@ WORLDS: dict[str, World] = {
         0,
     ),
 }
+
+
+def in_words(name: str) -> str:
+    """Return the name of a world as a picture shows it."""
+    return name.replace("2_5_radii", "2.5_radii").replace("_", " ")
