@@ -22,9 +22,15 @@ typedef struct fw_adg1206 {
     fw_lines lines;
 } fw_adg1206;
 
-/* Drive through i_plus and i_minus, measure from v_plus to v_minus. Errors: FW_E_ARGUMENT (an
- * electrode above 15, or both of a pair the same; nothing is switched), those of the lines (all are
- * left disabled then, if the lines still work). */
+/* The address lines that drive through i_plus and i_minus, and measure from v_plus to v_minus.
+ * Errors: FW_E_ARGUMENT (an electrode above 15, or both of a pair the same). */
+fw_status fw_adg1206_addresses(const uint8_t electrodes[4], uint32_t *addresses);
+
+/* Connect the electrodes that these address lines choose. Errors: those of the lines (all are left
+ * disabled then, if the lines still work). */
+fw_status fw_adg1206_join(const fw_adg1206 *bank, uint32_t addresses);
+
+/* Both: nothing is switched if an electrode is wrong. */
 fw_status fw_adg1206_select(const fw_adg1206 *bank, const uint8_t electrodes[4]);
 
 /* Disconnect all electrodes. Errors: those of the lines. */

@@ -55,8 +55,8 @@ typedef struct fw_burst {
     const uint16_t *samples; /* right-aligned codes; valid until the next burst ends */
     /* of its slot on the board's clock, exact: differences are multiples of slot_us */
     uint32_t start_us;
-    uint32_t next_start_us; /* when the next slot's first sample will be taken */
-    bool lost;              /* the converter overran or DMA failed: do not use it */
+    uint32_t entered_us; /* when its interrupt looked at the clock, soon after it began */
+    bool lost;           /* the converter overran or DMA failed: do not use it */
 } fw_burst;
 
 typedef struct fw_capture_ops {

@@ -181,7 +181,7 @@ static void interrupt(fake_board *f)
     fw_burst burst = {
         .samples = samples, .start_us = (uint32_t)(f->slot_ns / 1000u), .lost = f->lose > 0};
     f->slot_ns += (uint64_t)f->setup.slot_us * 1000u;
-    burst.next_start_us = (uint32_t)(f->slot_ns / 1000u);
+    burst.entered_us = (uint32_t)(f->now_ns / 1000u);
     f->lose -= f->lose > 0;
     f->late_once_ns = 0;
     f->in_interrupt = true;

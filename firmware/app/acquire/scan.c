@@ -34,26 +34,58 @@ uint32_t fw_scan_next_rows(const fw_scan *scan)
     return scan->next_full ? scan->table.n_rows : scan->table.n_unique;
 }
 
-uint32_t fw_scan_row_at(const fw_scan *scan, uint32_t position)
+static uint32_t row_at(const fw_scan *scan, bool full, uint32_t position)
 {
-    const uint16_t *order = scan->next_full ? scan->table.order : scan->table.unique;
+    const uint16_t *order = full ? scan->table.order : scan->table.unique;
     return order == NULL ? position : order[position];
 }
 
-/* Select the row at `position`; `switched` says whether that worked. */
-static void switch_to(fw_scan *scan, uint32_t position)
+uint32_t fw_scan_row_at(const fw_scan *scan, uint32_t position)
 {
-    const uint8_t *electrodes = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, position);
-    scan->position = position;
-    scan->switched = fw_adg1206_select(&scan->mux, electrodes) == FW_OK;
-    scan->switched_us = fw_now_us(scan->board);
+    return row_at(scan, scan->next_full, position);
 }
 
-static bool same_drive(const fw_scan *scan, uint32_t position, uint32_t other)
+static const uint8_t *electrodes_of(const fw_scan *scan, uint32_t row)
 {
-    const uint8_t *a = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, position);
-    const uint8_t *b = scan->table.protocol + 4 * (size_t)fw_scan_row_at(scan, other);
+    return scan->table.protocol + 4 * (size_t)row;
+}
+
+static bool same_drive(const fw_scan *scan, uint32_t row, uint32_t other)
+{
+    const uint8_t *a = electrodes_of(scan, row), *b = electrodes_of(scan, other);
     return a[0] == b[0] && a[1] == b[1];
+}
+
+/* The row at `position` of a frame. */
+static fw_scan_row find_row(const fw_scan *scan, bool full, uint32_t position)
+{
+    const uint32_t rows = full ? scan->table.n_rows : scan->table.n_unique;
+    fw_scan_row found = {.position = position, .row = row_at(scan, full, position)};
+    found.last = position + 1 == rows;
+    found.ends_drive = found.last || !same_drive(scan, found.row, row_at(scan, full, position + 1));
+    found.valid = fw_adg1206_addresses(electrodes_of(scan, found.row), &found.addresses) == FW_OK;
+    return found;
+}
+
+static bool is_full(const fw_scan *scan, uint32_t number)
+{
+    const uint32_t every = scan->settings.check_every;
+    return every != 0 && number % every == 0;
+}
+
+/* Look up the row after `now`: the switch to it must not wait for that. */
+static void prepare(fw_scan *scan)
+{
+    const bool last = scan->now.last;
+    scan->next = find_row(scan, last ? is_full(scan, scan->next_number + 1) : scan->next_full,
+                          last ? 0 : scan->now.position + 1);
+}
+
+/* Select a row; `switched` says whether that worked. */
+static void switch_to(fw_scan *scan, const fw_scan_row *row)
+{
+    scan->switched = row->valid && fw_adg1206_join(&scan->mux, row->addresses) == FW_OK;
+    scan->switched_us = fw_now_us(scan->board);
 }
 
 /* The drive that ends with the row at `position` has been measured. */
@@ -85,8 +117,7 @@ static void report_drive(fw_scan *scan, uint32_t position, uint32_t start_us, bo
 /* Whether the next frame measures all rows. */
 static void plan_frame(fw_scan *scan)
 {
-    const uint32_t every = scan->settings.check_every;
-    scan->next_full = every != 0 && scan->next_number % every == 0;
+    scan->next_full = is_full(scan, scan->next_number);
 }
 
 /* A free frame begins with the burst that began at start_us. Returns false if none is free, or if
@@ -135,7 +166,6 @@ static void end_frame(fw_scan *scan, uint32_t start_us)
 static void on_burst(void *user, const fw_burst *burst)
 {
     fw_scan *scan = user;
-    const uint32_t entered_us = fw_now_us(scan->board);
     atomic_fetch_add_explicit(&scan->bursts, 1, memory_order_relaxed);
     /* the clock is read after the switch and rounded down: hence >, not >= */
     const bool settled = scan->switched && (int32_t)(burst->start_us - scan->switched_us) >
@@ -147,36 +177,36 @@ static void on_burst(void *user, const fw_burst *burst)
         if (!scan->switched) {
             if (scan->frame != NULL)
                 ++scan->frame->bus_errors;
-            switch_to(scan, scan->position);
+            switch_to(scan, &scan->now);
         }
         return;
     }
     if (scan->frame == NULL && !begin_frame(scan, burst->start_us))
         return;
-    fw_frame *frame = scan->frame;
-    const uint32_t position = scan->position, row = fw_scan_row_at(scan, position);
-    const bool last = position + 1 == fw_scan_next_rows(scan);
-    const bool drive_ends = last || !same_drive(scan, position, position + 1);
     const bool bus_error = !scan->switched;
-    if (last) {
+    switch_to(scan, &scan->next);
+    const fw_scan_row measured = scan->now;
+    fw_frame *frame = scan->frame;
+    if (measured.last) {
         ++scan->next_number;
         plan_frame(scan);
     }
-    switch_to(scan, last ? 0 : position + 1);
+    scan->now = scan->next;
+    prepare(scan);
     scan->tries = 0;
     frame->bus_errors += bus_error;
     if (good) {
-        const bool saturated =
-            fw_demodulate(scan->demodulator, burst->samples, burst->start_us, &frame->z[row]);
-        frame->quality[row] = saturated ? EITS_QUALITY_SATURATED : 0;
+        const bool saturated = fw_demodulate(scan->demodulator, burst->samples, burst->start_us,
+                                             &frame->z[measured.row]);
+        frame->quality[measured.row] = saturated ? EITS_QUALITY_SATURATED : 0;
     } else {
-        frame->z[row] = (fw_iq){0, 0};
-        frame->quality[row] = EITS_QUALITY_UNSETTLED;
+        frame->z[measured.row] = (fw_iq){0, 0};
+        frame->quality[measured.row] = EITS_QUALITY_UNSETTLED;
     }
-    frame->busy_us += fw_now_us(scan->board) - entered_us;
-    if (drive_ends)
-        report_drive(scan, position, burst->start_us, last);
-    if (last)
+    frame->busy_us += fw_now_us(scan->board) - burst->entered_us;
+    if (measured.ends_drive)
+        report_drive(scan, measured.position, burst->start_us, measured.last);
+    if (measured.last)
         end_frame(scan, burst->start_us);
 }
 
@@ -208,7 +238,9 @@ fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const f
     if (status != FW_OK)
         return status;
     plan_frame(scan);
-    switch_to(scan, 0);
+    scan->now = find_row(scan, scan->next_full, 0);
+    switch_to(scan, &scan->now);
+    prepare(scan);
     scan->watched_us = fw_now_us(scan->board);
     scan->watched_bursts = atomic_load(&scan->bursts);
     status = scan->switched ? capture->ops->start(capture->ctx) : FW_E_BUS;

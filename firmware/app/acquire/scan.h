@@ -1,9 +1,9 @@
 /* The scan measures the rows of a protocol table slot by slot, in the capture's interrupt, into one
  * of two frames.
  *
- * Each interrupt first switches the multiplexers to the next row, and demodulates the burst of the
- * last row while they settle. If a switch came too late, its row is measured again. While both
- * frames are full, the scan waits. */
+ * Each interrupt first switches the multiplexers to the next row, which the interrupt before has
+ * looked up, and demodulates the burst of the last row while they settle. If a switch came too
+ * late, its row is measured again. While both frames are full, the scan waits. */
 #ifndef FW_SCAN_H
 #define FW_SCAN_H
 
@@ -21,6 +21,15 @@
 
 #define FW_SCAN_DRIVES 32u
 
+/* What the scan measures in a slot. */
+typedef struct fw_scan_row {
+    uint32_t addresses; /* of the multiplexers, if `valid` */
+    uint32_t position;  /* in the list of rows */
+    uint32_t row;
+    bool valid, last; /* row of its frame */
+    bool ends_drive;  /* the next row has another drive, or is of the next frame */
+} fw_scan_row;
+
 typedef struct fw_scan {
     const fw_board *board;
     const fw_demodulator *demodulator;
@@ -31,12 +40,12 @@ typedef struct fw_scan {
     fw_frame *frames; /* two */
     bool running;
     /* used by the interrupt while the scan runs */
-    fw_frame *frame;   /* being filled; NULL: between frames */
-    uint32_t position; /* in the list of rows */
+    fw_frame *frame; /* being filled; NULL: between frames */
+    fw_scan_row now, next;
     uint32_t tries;
     uint32_t switched_us;
     uint32_t next_due_us;
-    bool switched; /* the row at `position` is selected */
+    bool switched; /* the row `now` is selected */
     bool due_known, next_full;
     uint32_t next_number;
     /* used by both the interrupt and the main loop */

@@ -70,7 +70,7 @@ static void next_burst(bool lost)
 {
     const fw_burst burst = {.samples = buffers[capture.buffer],
                             .start_us = capture.start_us,
-                            .next_start_us = capture.start_us + capture.setup.slot_us,
+                            .entered_us = mps2_time_us(NULL),
                             .lost = lost};
     if (!lost) {
         mps2_hold_time();
@@ -79,7 +79,7 @@ static void next_burst(bool lost)
                         burst.start_us - capture.first_us);
         mps2_release_time();
     }
-    capture.start_us = burst.next_start_us;
+    capture.start_us += capture.setup.slot_us;
     capture.buffer ^= 1u;
     capture.done(capture.user, &burst);
 }

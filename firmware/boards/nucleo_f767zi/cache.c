@@ -8,6 +8,7 @@ enum { LINE_BYTES = 32, SETS = 128, WAYS = 4 };
 #define XN            (1u << 28)
 #define NO_ACCESS     (0u << 24)
 #define READ_WRITE    (3u << 24)
+#define READ_ONLY     (6u << 24)
 #define WRITE_THROUGH (2u << 16)  /* TEX 0, C 1, B 0: what is stored reaches the flash interface */
 #define WRITE_BACK    (11u << 16) /* TEX 1, C 1, B 1: allocates on reads and writes */
 #define UNCACHED      (8u << 16)  /* TEX 1, C 0, B 0 */
@@ -27,8 +28,7 @@ void nucleo_cache_start(void)
     /* Later regions win. The first closes 0x60000000 to 0xDFFFFFFF, where nothing is connected: the
      * core may read ahead from ordinary memory, and would wait for ever (AN4839 4). */
     region(0, 0x00000000u, XN | NO_ACCESS | LEFT_OUT(0x87u) | SIZE_LOG2(32u));
-    /* ITCM, not used: catches null pointers */
-    region(1, 0x00000000u, XN | NO_ACCESS | SIZE_LOG2(14u));
+    region(1, 0x00000000u, READ_ONLY | UNCACHED | SIZE_LOG2(14u));       /* ITCM */
     region(2, 0x08000000u, READ_WRITE | WRITE_THROUGH | SIZE_LOG2(21u)); /* flash */
     region(3, 0x20000000u, XN | READ_WRITE | UNCACHED | SIZE_LOG2(17u)); /* DTCM */
     /* SRAM1 and 2: after its first 128 KB */
@@ -36,6 +36,8 @@ void nucleo_cache_start(void)
     region(5, 0x40000000u, XN | READ_WRITE | DEVICE | SIZE_LOG2(29u)); /* peripherals */
     /* NUCLEO_STACK_GUARD_BYTES */
     region(6, (uint32_t)stack_bottom, XN | NO_ACCESS | SIZE_LOG2(8u));
+    /* the first 2 KB of ITCM, where null pointers lead */
+    region(7, 0x00000000u, XN | NO_ACCESS | SIZE_LOG2(11u));
     MPU_CTRL = MPU_CTRL_ENABLE | MPU_CTRL_PRIVDEFENA;
     DSB();
     ISB();

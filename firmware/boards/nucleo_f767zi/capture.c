@@ -156,22 +156,20 @@ static void stop(void *ctx)
     nucleo_unlock(ctx, state);
 }
 
-static void report_burst(uint32_t start_us, uint32_t buffer, uint32_t next_start_us, bool lost)
+static void report_burst(uint32_t start_us, uint32_t buffer, uint32_t now_us, bool lost)
 {
-    const fw_burst burst = {.samples = buffers[buffer],
-                            .start_us = start_us,
-                            .next_start_us = next_start_us,
-                            .lost = lost};
+    const fw_burst burst = {
+        .samples = buffers[buffer], .start_us = start_us, .entered_us = now_us, .lost = lost};
     capture.done(capture.user, &burst);
 }
 
 /* Report the burst that was due; the next one is due then. */
-static void next_burst(bool lost)
+static void next_burst(uint32_t now_us, bool lost)
 {
     const uint32_t start_us = capture.start_us, buffer = capture.buffer;
     capture.start_us += capture.slot_us;
     capture.buffer ^= 1u;
-    report_burst(start_us, buffer, capture.start_us, lost);
+    report_burst(start_us, buffer, now_us, lost);
 }
 
 /* DMA now fills the buffer `filling`, so the last burst that has ended is in the other one. If this
@@ -179,15 +177,16 @@ static void next_burst(bool lost)
  * be. The clock says how many; near the edge of a slot the buffer's parity decides. */
 static void bursts_ended(uint32_t filling)
 {
-    const uint32_t late_us = nucleo_time_us(NULL) - capture.start_us - capture.burst_us;
+    const uint32_t now_us = nucleo_time_us(NULL),
+                   late_us = now_us - capture.start_us - capture.burst_us;
     uint32_t missed = (int32_t)late_us < 0 ? 0 : late_us / capture.slot_us;
     if (((capture.buffer + missed) & 1u) == filling)
         missed +=
             missed == 0 || late_us % capture.slot_us > capture.slot_us / 2u ? 1u : (uint32_t)-1;
     for (; missed > 0 && capture.running; --missed)
-        next_burst(true);
+        next_burst(now_us, true);
     if (capture.running)
-        next_burst(false);
+        next_burst(now_us, false);
 }
 
 /* Stop, and continue in the first slot of the same grid that can be reached. */
@@ -198,7 +197,7 @@ static void burst_failed(void)
     const uint32_t now = nucleo_time_us(NULL),
                    slots = (now + LEAD_US - lost_us) / capture.slot_us + 1u;
     arm(lost_us + slots * capture.slot_us);
-    report_burst(lost_us, 0, capture.start_us, true);
+    report_burst(lost_us, 0, now, true);
 }
 
 void nucleo_dma2_stream0_irq(void)

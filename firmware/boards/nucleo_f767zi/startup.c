@@ -2,7 +2,7 @@
 #include "nucleo.h"
 
 extern uint32_t data_start[], data_end[], data_load[], bss_start[], bss_end[], dtcm_start[],
-    dtcm_end[];
+    dtcm_end[], itcm_start[], itcm_end[], itcm_load[], itcm_vectors[];
 
 void nucleo_reset(void);
 void nucleo_start(void);
@@ -47,6 +47,12 @@ __attribute__((naked)) void nucleo_reset(void)
                    "b nucleo_start\n" ::"i"(NUCLEO_STACK_PAINT));
 }
 
+static void copy(uint32_t *to, const uint32_t *end, const uint32_t *from)
+{
+    while (to < end)
+        *to++ = *from++;
+}
+
 static void clear(uint32_t *word, const uint32_t *end)
 {
     while (word < end)
@@ -55,15 +61,17 @@ static void clear(uint32_t *word, const uint32_t *end)
 
 __attribute__((used, noreturn)) void nucleo_start(void)
 {
-    SCB_VTOR = (uint32_t)vectors;
     SCB_CPACR |= 0xFu << 20; /* full access to CP10 and CP11, the FPU (PM0253 4.6.1) */
     DSB();
     ISB();
     /* on after a reset, but a debugger may have changed it */
     RCC_AHB1ENR |= RCC_AHB1ENR_DTCMRAMEN;
-    const uint32_t *from = data_load;
-    for (uint32_t *to = data_start; to < data_end; ++to)
-        *to = *from++;
+    copy(itcm_start, itcm_end, itcm_load);
+    copy(itcm_vectors, itcm_vectors + CORE_VECTORS + IRQ_COUNT, (const uint32_t *)vectors);
+    SCB_VTOR = (uint32_t)itcm_vectors; /* an interrupt does not wait for the flash */
+    copy(data_start, data_end, data_load);
+    DSB();
+    ISB();
     clear(bss_start, bss_end);
     clear(dtcm_start, dtcm_end);
     (void)main();

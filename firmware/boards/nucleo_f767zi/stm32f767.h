@@ -259,6 +259,11 @@
 #define IWDG_RLR  REG32(IWDG_BASE + 0x08u)
 #define IWDG_SR   REG32(IWDG_BASE + 0x0Cu)
 
+/* RM0410 40.16: what stands still while a debugger halts the processor */
+#define DBGMCU_BASE             0xE0042000u
+#define DBGMCU_APB1FZ           REG32(DBGMCU_BASE + 0x08u)
+#define DBGMCU_APB1FZ_IWDG_STOP (1u << 12)
+
 /* ---- unique device identifier, 96 bits, section 45.1 ---- */
 #define UID_BASE  0x1FF0F420u
 #define UID(word) REG32(UID_BASE + 4u * (word))

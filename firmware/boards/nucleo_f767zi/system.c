@@ -76,6 +76,9 @@ void nucleo_system_start(void)
     nucleo_interrupt(IRQ_PVD, 0);
     set_brown_out(); /* before the watchdog: it takes as long as the erase of a sector */
 
+    /* While a debugger halts the processor the watchdog stands still: it would reset what is looked
+     * at. The current flows on then; docs/guide/board.md says so. */
+    DBGMCU_APB1FZ |= DBGMCU_APB1FZ_IWDG_STOP;
     IWDG_KR = 0xCCCCu;
     IWDG_KR = 0x5555u;
     IWDG_RLR = WATCHDOG_RELOAD - 1u;

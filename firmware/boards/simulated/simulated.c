@@ -232,7 +232,7 @@ static bool next_burst(sim_board *sim)
     listen(sim);
     const fw_burst burst = {.samples = converter->codes,
                             .start_us = (uint32_t)start_us,
-                            .next_start_us = (uint32_t)converter->slot_us};
+                            .entered_us = (uint32_t)sim->now_us};
     converter->interrupts = true;
     converter->done(converter->user, &burst);
     converter->interrupts = false;

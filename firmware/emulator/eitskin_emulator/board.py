@@ -79,6 +79,16 @@ class EmulatedBoard(BoardParts):
         """The owner holds the blue button (B1 lifts PC13), or lets go of it."""
         self.ports["C"].outside = 1 << BUTTON_PIN if held else 0
 
+    def halt(self, time_s: float) -> None:
+        """A debugger halts the processor for so long. All else goes on, but for what the program
+        has told DBGMCU to stop."""
+        until = self.clock.now + round(time_s * TICKS_PER_S)
+        if self.debug.stops_watchdog:
+            self.iwdg.hold(until - self.clock.now)
+        while self.clock.now < until:
+            self.clock.skip_to(min(self.schedule.next_at(), until))
+            self.schedule.run_due(self.clock.now)
+
     def send(self, data: bytes) -> None:
         """The host sends ``data``: at 1 Mbaud from now on, or when what it sent before has left."""
         self.line.send(data)
@@ -133,6 +143,7 @@ class EmulatedBoard(BoardParts):
         self.drive.start(self.clock.now)
         if cause == "power":
             self.memories.lose_power()
+            self.debug.values = dict(self.debug.reset_values)
         self._reset_cause, self._asleep, self.locked_up = None, False, False
         self._later.clear()
         self.rcc.reset(cause)
@@ -185,15 +196,16 @@ class EmulatedBoard(BoardParts):
         return True
 
     def _enter(self, number: int, pc: int | None = None) -> None:
-        handler = self.memories.word(self.scb.vtor + 4 * number)
-        stacked = self.exceptions.enter(number, handler, thread=not self.nvic.active, pc=pc)
+        vector = self.scb.vtor + 4 * number
+        thread = not self.nvic.active
+        stacked = self.exceptions.enter(number, vector, thread=thread, pc=pc)
         self.nvic.enter(number)
         self.record.interrupts[number] += 1
         if not stacked or self.mpu.denies(self.exceptions.stack_pointer()):
             self._fault(MEMORY_FAULT, scb.MSTKERR, "stacking", None)
 
     def _slice(self, due: int) -> None:
-        cycles = -(-(due - self.clock.now) // self.clock.cycle_ticks)
+        cycles = -(-(due - self.clock.now) // self.clock.instruction_ticks)
         cycles = max(min(cycles, LONGEST_SLICE), 1)
         if self.nvic.pending & self.nvic.enabled and self._only_masked():
             self._masked += 1  # it must be taken right after the mask is lifted (B1.5.1)

@@ -20,7 +20,7 @@ from eitskin_emulator.peripherals.dwt import Dwt
 from eitskin_emulator.peripherals.exti import Exti
 from eitskin_emulator.peripherals.flash import FlashInterface
 from eitskin_emulator.peripherals.gpio import ANALOG, GpioPort
-from eitskin_emulator.peripherals.iwdg import Iwdg
+from eitskin_emulator.peripherals.iwdg import DebugControl, Iwdg
 from eitskin_emulator.peripherals.mpu import Mpu
 from eitskin_emulator.peripherals.nvic import (
     NMI,
@@ -126,6 +126,7 @@ class BoardParts:
         self.usart = Usart(clock, schedule, self.nvic, self.rcc, self.dmas[1], self.line, record)
         self.flash = FlashInterface(self.memories, record, self.cpu.stall, self._after_slice)
         self.iwdg = Iwdg(clock, schedule, record, lambda: self.reset("watchdog"))
+        self.debug = DebugControl(record)
         own = (self.rcc, self.pwr, self.spi, self.adc, self.usart, self.flash, self.iwdg, self.exti)
         peripherals: list[Peripheral] = [
             *own,
@@ -135,6 +136,7 @@ class BoardParts:
         ]
         for peripheral in peripherals:
             self.bus.add(peripheral)
+        self.bus.add(self.debug)
         for core in (self.scb, self.dwt):
             self.bus.add(core, kilobytes=4)
 

@@ -2,10 +2,9 @@
 is a whole number of them.
 
 The processor's part of it is instructions: one cycle each at the clock that RCC is set to. That is
-an assumption, and times are
-estimates: a Cortex-M7 issues up to two instructions a cycle, and waits for flash, divisions and
-    mispredicted branches. What
-does not hang on the processor (slots, samples, bits on wires) is exact.
+an assumption, and times are estimates: a Cortex-M7 issues up to two instructions per cycle, and
+waits for flash, divisions and mispredicted branches. ``timing`` replaces the assumption by a lower
+and an upper bound. What does not depend on the processor (slots, samples, bits on wires) is exact.
 """
 
 from typing import Protocol
@@ -30,6 +29,7 @@ class BoardClock:
 
     def __init__(self) -> None:
         self.cycle_ticks = 27
+        self.instruction_ticks = 27  # an instruction takes so long
         self._base = 0
         self._count: TickCount | None = None  # of the running slice's instructions
         self._counted = 0  # of which are in _base
@@ -41,7 +41,7 @@ class BoardClock:
         return (
             self._base
             if count is None
-            else self._base + (count.value - self._counted) * self.cycle_ticks
+            else self._base + (count.value - self._counted) * self.instruction_ticks
         )
 
     @property
@@ -55,14 +55,14 @@ class BoardClock:
 
     def slice_ends(self, executed: int) -> None:
         """The slice has executed so many instructions."""
-        self._base += (executed - self._counted) * self.cycle_ticks
+        self._base += (executed - self._counted) * self.instruction_ticks
         self._count = None
 
     def set_cycle_ticks(self, ticks: int) -> None:
-        """From now on a cycle takes so long."""
+        """From now on a cycle takes so long, and an instruction a cycle."""
         self._base = self.now
         self._counted = 0 if self._count is None else self._count.value
-        self.cycle_ticks = ticks
+        self.cycle_ticks = self.instruction_ticks = ticks
 
     def skip(self, ticks: int) -> None:
         """The processor stands still for so long (stalled, asleep, or entering an exception)."""

@@ -9,7 +9,7 @@ unaligned traps of LDRD and LDM.
 """
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum, auto
 from typing import Any
 
@@ -105,12 +105,15 @@ class Cpu:
         self._kept = self._map_peripherals()
         engine.hook_add(uc.UC_HOOK_INTR, self._told)
         engine.hook_add(uc.UC_HOOK_MEM_INVALID, self._missed)
-        self._counter = Counter(engine)
+        self.counter = Counter(engine)
         self._running = False
         self._failure: BaseException | None = None
         self._told_of = 0
         self.fault_address = 0
         self.horizon = 0
+        self.slices = 0
+        # what an access to a peripheral costs besides its instruction (address, whether it stores)
+        self.bus_waits: Callable[[int, bool], None] | None = None
         self.pc_register = RegisterSet(engine, (arm.UC_ARM_REG_PC,))
         self.masks = RegisterSet(
             engine, (arm.UC_ARM_REG_PRIMASK, arm.UC_ARM_REG_BASEPRI, arm.UC_ARM_REG_FAULTMASK)
@@ -129,7 +132,8 @@ class Cpu:
         """Execute at most so many instructions, meant to last until ``horizon`` (ticks); tells why
         it stopped."""
         self._told_of, self.horizon = 0, horizon
-        stop, begun = CpuStop.COUNT, self._counter.begun
+        self.slices += 1
+        stop, begun = CpuStop.COUNT, self.counter.begun
         begun.value = 0
         self._running = True
         self.clock.slice_begins(begun)
@@ -156,21 +160,21 @@ class Cpu:
         past."""
         if self._running and at < self.horizon:
             self.horizon = at
-            left = -(-(at - self.clock.now) // self.clock.cycle_ticks)
-            self._counter.stop_after(self._counter.begun.value + max(left, 0))
+            left = -(-(at - self.clock.now) // self.clock.instruction_ticks)
+            self.counter.stop_after(self.counter.begun.value + max(left, 0))
 
     def stall(self, ticks: int) -> None:
         """Stand still for so long."""
         self.clock.skip(ticks)
         if self._running:
-            left = -(-(self.horizon - self.clock.now) // self.clock.cycle_ticks)
-            self._counter.stop_after(self._counter.begun.value + max(left, 0))
+            left = -(-(self.horizon - self.clock.now) // self.clock.instruction_ticks)
+            self.counter.stop_after(self.counter.begun.value + max(left, 0))
 
     def end_slice(self) -> None:
         """End the running slice after this instruction."""
         if self._running:
             self.horizon = 0
-            self._counter.stop_after(0)
+            self.counter.stop_after(0)
 
     def _why(self, started: int) -> CpuStop:
         if self._told_of == EXCEPTION_RETURN:
@@ -184,7 +188,7 @@ class Cpu:
             return CpuStop.FETCH_FAULT
         if self._told_of:
             return CpuStop.INSTRUCTION_FAULT
-        return CpuStop.COUNT if started > self._counter.limit else CpuStop.SLEEP
+        return CpuStop.COUNT if started > self.counter.limit else CpuStop.SLEEP
 
     def _told(self, engine: Any, number: int, data: object) -> None:
         self._told_of = number
@@ -206,6 +210,8 @@ class Cpu:
                 engine: object, offset: int, width: int, data: object, base: int = base
             ) -> int:
                 try:
+                    if self.bus_waits is not None:
+                        self.bus_waits(base + offset, False)
                     return self.bus.read(base + offset, width)
                 except BaseException as failure:  # raised again when the slice has ended
                     self._failed(failure)
@@ -215,6 +221,8 @@ class Cpu:
                 engine: object, offset: int, width: int, value: int, data: object, base: int = base
             ) -> None:
                 try:
+                    if self.bus_waits is not None:
+                        self.bus_waits(base + offset, True)
                     self.bus.write(base + offset, width, value)
                 except BaseException as failure:
                     self._failed(failure)

@@ -6,6 +6,7 @@ may put it off. Entry takes 12 cycles and return 10. Only the main stack pointer
 """
 
 import struct
+from collections.abc import Callable
 
 from unicorn import arm_const as arm
 
@@ -63,9 +64,12 @@ class Exceptions:
         self._into = RegisterSet(cpu.engine, _INTO)
         self._back = RegisterSet(cpu.engine, _BACK)
         self._fpu = RegisterSet(cpu.engine, _FPU)
+        # cycles of an entry through a vector, or of a return (0), where a bound counts them
+        self.entry_waits: Callable[[int], int] | None = None
 
-    def enter(self, number: int, handler: int, thread: bool, pc: int | None = None) -> bool:
-        """Go into exception ``number`` at ``handler``; ``thread``: from no other. ``pc``: where to
+    def enter(self, number: int, vector: int, thread: bool, pc: int | None = None) -> bool:
+        """Go into exception ``number``, whose handler's address is at ``vector``; ``thread``: from
+        no other. ``pc``: where to
         return, if not where it stands. False: the frame has no room in memory, and nothing has
         changed but the program counter and the stack pointer.
         """
@@ -89,8 +93,8 @@ class Exceptions:
         self._into.write(
             (sp, control & ~FPCA & 3, exc_return, values[7] & 0xF80F0000 | 1 << 24 | number)
         )
-        self._cpu.pc = handler
-        self._cpu.clock.skip(ENTRY_CYCLES * self._cpu.clock.cycle_ticks)
+        self._cpu.pc = self._memories.word(vector)
+        self._cpu.clock.skip(self._cycles(ENTRY_CYCLES, vector) * self._cpu.clock.cycle_ticks)
         return stacked
 
     def leave(self) -> bool:
@@ -111,8 +115,11 @@ class Exceptions:
         back = (control & 3) | (FP_CONTEXT if large else 0)
         self._back.write((*frame[:6], frame[7] & ~ALIGNED, frame[7] & APSR_BITS, sp, back))
         self._cpu.pc = frame[6]
-        self._cpu.clock.skip(RETURN_CYCLES * self._cpu.clock.cycle_ticks)
+        self._cpu.clock.skip(self._cycles(RETURN_CYCLES, 0) * self._cpu.clock.cycle_ticks)
         return True
+
+    def _cycles(self, usual: int, vector: int) -> int:
+        return usual if self.entry_waits is None else self.entry_waits(vector)
 
     def stack_pointer(self) -> int:
         """The stack pointer."""

@@ -15,7 +15,7 @@ from unicorn.unicorn_const import UC_PROT_ALL, UC_PROT_EXEC, UC_PROT_NONE, UC_PR
 FLASH, FLASH_BYTES, FLASH_ITCM = 0x08000000, 0x200000, 0x00200000
 PROGRAM_BYTES = 0x40000
 BANKS, BANK_BYTES = (0x08040000, 0x080C0000), 0x80000
-ITCM, ITCM_BYTES = 0x00000000, 0x4000
+ITCM, ITCM_BYTES, ITCM_PAGE = 0x00000000, 0x4000, 0x800
 RAM, RAM_BYTES = 0x20000000, 0x80000  # DTCM 128 KB, SRAM1 368 KB, SRAM2 16 KB without a gap
 DTCM_BYTES = 0x20000
 SYSTEM, SYSTEM_BYTES = 0x1FF0F000, 0x1000
@@ -54,9 +54,10 @@ class Memories:
         self._map(RAM, self.ram, 0, RAM_BYTES, UC_PROT_ALL)
         self._map(SYSTEM, self.system, 0, SYSTEM_BYTES, UC_PROT_READ)
 
-    def deny_itcm(self, denied: bool) -> None:
-        """Whether the MPU forbids the first 16 KB, where null pointers lead."""
-        self._engine.mem_protect(ITCM, ITCM_BYTES, UC_PROT_NONE if denied else UC_PROT_ALL)
+    def protect_itcm(self, at: int, denied: bool, read_only: bool) -> None:
+        """What the MPU forbids in ``ITCM_PAGE`` bytes of ITCM from ``at`` on."""
+        allowed = UC_PROT_READ | UC_PROT_EXEC if read_only else UC_PROT_ALL
+        self._engine.mem_protect(at, ITCM_PAGE, UC_PROT_NONE if denied else allowed)
 
     def open_piece(self, at: int, read: Any, write: Any) -> None:
         """Let ``read(engine, offset, size, data)`` and ``write(engine, offset, size, value, data)``

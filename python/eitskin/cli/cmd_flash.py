@@ -9,9 +9,9 @@ from hashlib import sha256
 from pathlib import Path
 
 from eitskin.cli.arguments import option
-from eitskin.device.flash import TOOLS, plan_flash, run_flash
+from eitskin.device.flash import TOOLS, check_image, export_flash, plan_flash, run_flash
 from eitskin.errors import UsageError
-from eitskin.fileio import write_bytes
+from eitskin.fileio import read_bytes, write_bytes
 from eitskin.firmware.prebuilt import BOARD, load_image
 from eitskin.model.eitm import load_model
 from eitskin.model.prebuilt import load_prebuilt
@@ -28,6 +28,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     option(parser, "--no-model", "do not change the models on the board")
     option(parser, "--tool", "default: the first one installed", choices=TOOLS)
     option(parser, "--serial NUMBER", "serial number of the ST-LINK, if several are plugged in")
+    option(
+        parser,
+        "--export FILE",
+        "write firmware and model into FILE (.bin or .hex) for the drive that the ST-LINK shows;"
+        " needs no tool and no board",
+        Path,
+    )
     option(parser, "--dry-run", "print the commands and do nothing")
     option(parser, "--json", "print for programs; only with --dry-run")
     parser.set_defaults(run=run)
@@ -41,6 +48,8 @@ def run(options: argparse.Namespace) -> int:
     model = None
     if not options.no_model:
         model = (load_prebuilt() if options.model is None else load_model(options.model))[1]
+    if options.export is not None:
+        return _export(options, model)
     folder = Path(tempfile.mkdtemp(prefix="eitskin-flash-"))
     try:
         image = options.image if options.image is not None else _prebuilt_image(folder)
@@ -60,6 +69,23 @@ def run(options: argparse.Namespace) -> int:
         return 0
     shutil.rmtree(folder)
     print("done; ask the board with  eitskin info")
+    return 0
+
+
+def _export(options: argparse.Namespace, model: bytes | None) -> int:
+    """Write the file to drag onto the board's drive."""
+    if options.dry_run or options.tool is not None or options.serial is not None:
+        raise UsageError(
+            "flash: --export writes a file alone; leave out --dry-run, --tool, --serial"
+        )
+    if options.image is None:
+        image = load_image()[0]
+    else:
+        image = read_bytes(options.image, "firmware image")
+        check_image(options.image, image)
+    content = export_flash(image, model, options.export.suffix.lower())
+    write_bytes(options.export, content)
+    print(f"{options.export}: {len(content)} bytes; copy it onto the drive NOD_F767ZI")
     return 0
 
 

@@ -83,6 +83,47 @@ def plan_flash(
     return FlashPlan(name, tuple(_MAKERS[name](pieces, serial)), path, bank_file)
 
 
+def export_flash(image: bytes, model: bytes | None, suffix: str) -> bytes:
+    """Return one file that holds the firmware ``image`` and, where given, ``model`` in the first
+    bank, for the drive that an ST-LINK shows: ".bin" begins at the start of the flash and has ones
+    between the pieces; ".hex" (Intel's format) has the pieces alone, and erases the record of the
+    second bank, as flashing by a tool does.
+
+    Raises:
+        UsageError: another ``suffix``.
+    """
+    pieces = [(FIRMWARE_ADDRESS, image)]
+    if model is not None:
+        pieces.append((BANK_ADDRESS, bank_bytes(model, 1)))
+    if suffix == ".bin":
+        whole = bytearray()
+        for address, content in pieces:
+            whole += bytes([ERASED]) * (address - FIRMWARE_ADDRESS - len(whole)) + content
+        return bytes(whole)
+    if suffix == ".hex":
+        if model is not None:
+            erased = bytes([ERASED]) * RECORD_BYTES
+            pieces.append((SECOND_BANK_ADDRESS + record_offset(), erased))
+        lines = [line for address, content in pieces for line in _hex_lines(address, content)]
+        return "".join(f"{line}\n" for line in (*lines, ":00000001FF")).encode("ascii")
+    raise UsageError(f"--export: a name that ends in {suffix or 'nothing'}; end it in .bin or .hex")
+
+
+def _hex_lines(address: int, content: bytes) -> list[str]:
+    """Records of 16 bytes; each 64 KB begins with the upper half of its address."""
+    lines = []
+    for at in range(address, address + len(content), 16):
+        if at == address or at % 0x10000 == 0:
+            lines.append(_hex_line(0, 4, struct.pack(">H", at >> 16)))
+        lines.append(_hex_line(at & 0xFFFF, 0, content[at - address : at - address + 16]))
+    return lines
+
+
+def _hex_line(address: int, kind: int, content: bytes) -> str:
+    record = struct.pack(">BHB", len(content), address, kind) + content
+    return f":{record.hex()}{-sum(record) & 0xFF:02x}".upper()
+
+
 def check_image(path: Path, image: bytes) -> None:
     """Refuse what cannot be this board's firmware."""
     if image[:4] == b"\x7fELF":

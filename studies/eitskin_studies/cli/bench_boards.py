@@ -57,6 +57,38 @@ def run_board(options: argparse.Namespace) -> int:
     return show(options, result, bench_board.as_text(result), filling, "board-cost")
 
 
+def add_time(what: Any) -> None:
+    """``bench time``."""
+    parser = what.add_parser(
+        "time",
+        help="a frame's time on the board as a range, by two bounds of the Cortex-M7's time",
+        description=(
+            "Run the firmware on the emulated NUCLEO-F767ZI while its time passes by an optimistic"
+            " and by a pessimistic bound: dual issue, latencies, branches, caches, flash and bus"
+            " waits. It takes about a minute for each image."
+        ),
+    )
+    option(parser, "--image BIN", "firmware (default: the prebuilt one)", Path)
+    option(parser, "--before BIN", "another firmware to compare with", Path)
+    option(parser, "--frames", "of each scan and bound", default=4)
+    add_page_option(parser, "board-cost")
+    parser.set_defaults(run=run_time)
+
+
+def run_time(options: argparse.Namespace) -> int:
+    """Bound what a frame takes on the board."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import time_range
+
+    check_within("--frames", options.frames, 1, 1000)
+    refuse_unwritable(options.page)
+    images = {"before": options.before} if options.before is not None else {}
+    result = time_range.run({**images, "now": options.image}, options.frames)
+    command = f"eitskin bench time --frames {options.frames}"
+    filling = time_range.for_page(result, command)
+    return show(options, result, time_range.as_text(result), filling, "board-cost")
+
+
 def add_energy(what: Any) -> None:
     """``bench energy``."""
     parser = what.add_parser("energy", help="energy a frame, estimated from data sheets")

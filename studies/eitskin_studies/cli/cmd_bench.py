@@ -1,6 +1,6 @@
 """``eitskin bench WHAT``: speed, side by side in one run: frames, solvers, building, scenes,
-boards, energy, kernels, growth, batches; the value of diagnostics, gestures, and touches beside
-their bound."""
+boards, their time, energy, kernels, growth, batches; the value of diagnostics, gestures, and
+touches beside their bound."""
 
 from typing import Any
 
@@ -15,6 +15,7 @@ def add_parser(subparsers: Any) -> None:
     bench_frames.add_solve(what)
     bench_making.add_jacobian(what)
     bench_boards.add_board(what)
+    bench_boards.add_time(what)
     bench_boards.add_energy(what)
     bench_frames.add_kernels(what)
     bench_frames.add_growth(what)

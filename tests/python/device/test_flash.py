@@ -2,12 +2,22 @@
 touched."""
 
 import struct
+from io import StringIO
 from pathlib import Path
 
+import intelhex
 import pytest
 
+from eitskin.cli.main import main
 from eitskin.device.bank import bank_bytes
-from eitskin.device.flash import TOOLS, FlashPlan, find_tool, plan_flash, run_flash
+from eitskin.device.flash import (
+    TOOLS,
+    FlashPlan,
+    export_flash,
+    find_tool,
+    plan_flash,
+    run_flash,
+)
 from eitskin.errors import DeviceError, UsageError
 from small_models import tiny_blob
 
@@ -106,3 +116,27 @@ def test_what_is_no_firmware_is_refused(content, message, tmp_path, tools):
     (tmp_path / "bad.bin").write_bytes(content)
     with pytest.raises(DeviceError, match=message):
         plan_flash(tmp_path / "bad.bin", None, tmp_path)
+
+
+def test_a_file_for_the_drive_holds_firmware_and_model_where_a_tool_puts_them():
+    bank = bank_bytes(tiny_blob(), 1)
+    binary = export_flash(IMAGE, tiny_blob(), ".bin")
+    assert binary[: len(IMAGE)] == IMAGE and binary[0x40000:] == bank
+    assert set(binary[len(IMAGE) : 0x40000]) == {0xFF}
+    assert export_flash(IMAGE, None, ".bin") == IMAGE
+    read = intelhex.IntelHex(StringIO(export_flash(IMAGE, tiny_blob(), ".hex").decode("ascii")))
+    assert read.tobinstr(start=0x08000000, size=len(IMAGE)) == IMAGE
+    assert read.tobinstr(start=0x08040000, size=len(bank)) == bank
+    assert read.tobinstr(start=0x0813FFE0, size=32) == b"\xff" * 32
+    assert len(read.segments()) == 3
+
+
+def test_export_writes_one_file_and_says_where_it_goes(tmp_path, image, capsys):
+    path = tmp_path / "board.hex"
+    assert main(["flash", "--image", str(image), "--no-model", "--export", str(path)]) == 0
+    assert "NOD_F767ZI" in capsys.readouterr().out
+    loaded = intelhex.IntelHex(str(path))
+    assert loaded.tobinstr(start=0x08000000, size=len(IMAGE)) == IMAGE
+    assert main(["flash", "--export", str(tmp_path / "board.elf"), "--no-model"]) == 2
+    assert "end it in .bin or .hex" in capsys.readouterr().err
+    assert main(["flash", "--export", str(path), "--dry-run"]) == 2

@@ -169,3 +169,14 @@ def test_option_bytes_are_left_alone_while_the_supply_is_low(image):
     board.drop_supply(True)
     board.run_until(round(0.1 * TICKS_PER_S))
     assert board.flash.options_programmed == 0
+
+
+def test_a_debugger_that_halts_the_processor_does_not_meet_the_watchdog(image):
+    board = board_of(connect(power_up(image, noisy=False)))
+    board.halt(5.0)
+    board.run_until(board.clock.now + TICKS_PER_S // 10)
+    assert board.record.resets == ["power"]
+    board.debug.values[8] = 0  # a program that has not asked for that
+    board.halt(5.0)
+    board.run_until(board.clock.now + TICKS_PER_S // 10)
+    assert board.record.resets == ["power", "watchdog"]

@@ -25,7 +25,9 @@ from unicorn.arm_const import (
     UC_CPU_ARM_CORTEX_M7,
 )
 
+ITCM, ITCM_BYTES = 0x00000000, 0x4000
 MEMORY = (
+    (ITCM, ITCM_BYTES),
     (0x08000000, 0x200000),
     (0x20000000, 0x80000),
     (0x40000000, 0x30000),
@@ -55,7 +57,11 @@ class BareImage:
         self._uc.ctl_set_cpu_model(UC_CPU_ARM_CORTEX_M7)
         for start, size in MEMORY:
             self._uc.mem_map(start, size)
-        self._uc.mem_write(0x08000000, elf.with_suffix(".bin").read_bytes())
+        image = elf.with_suffix(".bin").read_bytes()
+        self._uc.mem_write(0x08000000, image)
+        start, end = self.symbols["itcm_start"], self.symbols["itcm_end"]
+        load = self.symbols["itcm_load"] - 0x08000000  # what the start-up code copies
+        self._uc.mem_write(start, image[load : load + end - start])
         self._uc.mem_write(CALLBACK, BX_LR)
         self._uc.hook_add(UC_HOOK_CODE, self._called, begin=CALLBACK, end=CALLBACK)
         for dma in (DMA1, DMA2):

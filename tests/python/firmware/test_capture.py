@@ -43,9 +43,9 @@ class Capture:
 
     def _told(self, user: int, burst: int) -> None:
         assert user == 77
-        samples, start, next_start, lost = struct.unpack("<IIIB", self.image.read_bytes(burst, 13))
+        samples, start, entered, lost = struct.unpack("<IIIB", self.image.read_bytes(burst, 13))
         buffers = self.image.symbols["buffers"]
-        self.bursts.append((start, next_start, (samples - buffers) // 2048, bool(lost)))
+        self.bursts.append((start, entered, (samples - buffers) // 2048, bool(lost)))
 
     def interrupt(self, slots_done: int, now: int, flags: int = TCIF) -> list[Burst]:
         """The DMA interrupt at ``now``, after ``slots_done`` bursts since the start; what it
@@ -74,8 +74,8 @@ def test_bursts_in_time_alternate_between_the_buffers(elf):
     capture = Capture(elf)
     for slot in range(7):
         start = capture.first + SLOT_US * slot
-        reported = capture.interrupt(slot + 1, start + BURST_US + 3)
-        assert reported == [(start, start + SLOT_US, slot % 2, False)]
+        entered = start + BURST_US + 3
+        assert capture.interrupt(slot + 1, entered) == [(start, entered, slot % 2, False)]
 
 
 @pytest.mark.parametrize("now", [1000, 2**32 - 250])
@@ -88,12 +88,11 @@ def test_a_late_interrupt_tells_each_slot_once_and_only_the_last_is_whole(
     slot = 0
     for skipped in (0, missed, 0, missed):
         last = slot + skipped
-        reported = capture.interrupt(last + 1, capture.first + SLOT_US * last + BURST_US + late_us)
+        entered = (capture.first + SLOT_US * last + BURST_US + late_us) % 2**32
+        reported = capture.interrupt(last + 1, entered)
         starts = [(capture.first + SLOT_US * k) % 2**32 for k in range(slot, last + 1)]
         assert [start for start, *_ in reported] == starts
-        assert [next_start for _, next_start, *_ in reported] == [
-            (start + SLOT_US) % 2**32 for start in starts
-        ]
+        assert {one for _, one, *_ in reported} == {entered}
         assert [lost for *_, lost in reported] == [True] * skipped + [False]
         assert reported[-1][2] == last % 2
         slot = last + 1
@@ -126,13 +125,14 @@ def test_a_failure_is_told_and_the_scan_goes_on_in_the_same_grid(elf, cause):
         assert image.read(ADC_SR) == 0
     else:
         capture.interrupt(1, now, TEIF)
-    ((start, next_start, _, lost),) = capture.bursts
-    assert start == capture.first + SLOT_US and lost
+    ((start, entered, _, lost),) = capture.bursts
+    next_start = image.read(TIM5_CCR1) + 1
+    assert start == capture.first + SLOT_US and entered == now and lost
     assert next_start >= now + 20 and (next_start - capture.first) % SLOT_US == 0
-    assert image.read(TIM5_CCR1) == next_start - 1 and image.read(CR) & EN
+    assert image.read(CR) & EN
     assert image.read(ADC_CR2) & 1
     reported = capture.interrupt(1, next_start + BURST_US)
-    assert reported == [(next_start, next_start + SLOT_US, 0, False)]
+    assert reported == [(next_start, next_start + BURST_US, 0, False)]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,13 @@ from cross_build import ROOT, build_cortex_m7
 FLASH, FLASH_BYTES = 0x08000000, 256 * 1024  # of the program: models begin at 0x08040000
 DTCM, DTCM_BYTES = 0x20000000, 128 * 1024
 SRAM, SRAM_BYTES = 0x20020000, 384 * 1024
-MEMORIES = ((FLASH, FLASH_BYTES), (DTCM, DTCM_BYTES), (SRAM, SRAM_BYTES))
+ITCM, ITCM_GUARD, ITCM_BYTES = 0x00000000, 0x800, 16 * 1024
+MEMORIES = (
+    (ITCM + ITCM_GUARD, ITCM_BYTES - ITCM_GUARD),
+    (FLASH, FLASH_BYTES),
+    (DTCM, DTCM_BYTES),
+    (SRAM, SRAM_BYTES),
+)
 IMAGE = "eitskin_nucleo_f767zi"
 HANDLERS = {
     2: "nucleo_clock_irq",
@@ -26,6 +32,11 @@ HANDLERS = {
     16 + 39: "nucleo_usart3_irq",
     16 + 56: "nucleo_dma2_stream0_irq",
 }
+ON_TIME = (
+    *("nucleo_dma2_stream0_irq", "on_burst", "fw_adg1206_join", "fw_adg1206_all_off"),
+    *("write_lines", "wait_ns", "nucleo_multiplexers_ops", "nucleo_time_us", "nucleo_wake"),
+    *("fw_demodulate", "fw_sincos"),
+)
 RESERVED = (7, 8, 9, 10, 13)  # Armv7-M B1.5.2
 
 
@@ -69,6 +80,11 @@ def test_places_in_memory(sections, symbols):
     # to its 256 bytes.
     assert symbols["stack_bottom"] == DTCM
     assert symbols["stack_top"] - symbols["stack_bottom"] >= 8 * 1024
+    # The path from a burst's end to the next row meets no cache: code in ITCM, data in DTCM.
+    for name in ON_TIME:
+        assert ITCM + ITCM_GUARD <= symbols[name] < ITCM + ITCM_BYTES, name
+    assert symbols["itcm_vectors"] % 512 == 0
+    assert DTCM <= symbols["instrument"] < DTCM + DTCM_BYTES
     # DMA works on memory that no cache covers.
     for name in ("buffers", "tx_ring", "rx_ring"):
         assert DTCM <= symbols[name] < DTCM + DTCM_BYTES, name
@@ -91,8 +107,9 @@ def test_sizes(elf, sections, symbols):
     stack = symbols["stack_top"] - symbols["stack_bottom"]
     workspace = symbols["workspace_end"] - symbols["workspace_start"]
     print(f"\nflash {image} of {FLASH_BYTES} bytes, stack {stack}, DMA {sections['.dtcm'][0]}")
+    print(f"code in ITCM {sections['.itcm'][0]} of {ITCM_BYTES - ITCM_GUARD}")
     print(f"statics {sections['.bss'][0]}, workspace {workspace} of {SRAM_BYTES} bytes")
-    parts = (".vectors", ".text", ".ARM.exidx", ".data")
+    parts = (".vectors", ".itcm", ".text", ".ARM.exidx", ".data")
     assert image == sum(sections.get(name, (0, 0))[0] for name in parts)
     assert image <= FLASH_BYTES - 60_000, "60 kB of flash are kept for what is to come"
     assert workspace >= 256 * 1024

@@ -2,8 +2,8 @@
 of everything they share.
 
 There is no SVD file of the STM32F7 in a package; the F429's has its older peripherals, the L4's
-those that came between (USART, SPI with a FIFO) and the core's. What neither has is listed here,
-each with its section of RM0410 or PM0253.
+those that came between (USART, SPI with a FIFO) and the core's. ``f767_facts.toml`` has what
+neither has, and what differs between the families, each with its section of RM0410 or PM0253.
 """
 
 import re
@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 from svd_files import Device, Register, load_svd
+
+from eitskin.config import load_toml
 
 BOARD = Path(__file__).resolve().parents[3] / "firmware" / "boards" / "nucleo_f767zi"
 HEADER = BOARD / "stm32f767.h"
@@ -40,23 +42,14 @@ RENAMED = {
     "RCC_AHB1ENR_DTCMRAMEN": "CCMDATARAMEN",
     "FLASH_OPTCR_BOR": "BOR_LEV", "FLASH_ACR_ARTEN": "ICEN", "FLASH_SR_ERSERR": "PGSERR",
 }  # fmt: skip
-# In neither file.
-ONLY_F7 = {
-    "RCC_PLLCFGR_PLLR": 28,        # RM0410 5.3.2
-    "FLASH_OPTCR_NDBANK": 29,      # RM0410 3.7.6
-    "ADC_SMPR2_SMP3": 9,           # RM0410 15.13.5; the file has no fields there
-    "SCB_CCR_DC": 16,              # PM0253 4.3.7
-    "SCB_CCR_IC": 17,              # PM0253 4.3.7
-    "SCB_CSSELR": 0x84,            # PM0253 4.5.4
-    "SCB_CPACR": 0x88,             # PM0253 4.6.1; checked below against FPU_CPACR
-    "SCB_ICIALLU": 0x250,          # PM0253 4.8
-    "SCB_DCIMVAC": 0x25C,          # PM0253 4.8
-    "SCB_DCISW": 0x260,            # PM0253 4.8
-}  # fmt: skip
-# Not of a peripheral with an SVD: the trace unit and the identifier (Armv7-M C1.8.7, C1.6.5; RM0410
-# 45.1).
-ADDRESSES = {"DWT": 0xE0001000, "UID": 0x1FF0F420, "ADC_COMMON": 0x40012300}
-DWT_OFFSETS = {"DWT_CTRL": 0x00, "DWT_CYCCNT": 0x04, "DWT_LAR": 0xFB0}
+FACTS = load_toml(Path(__file__).with_name("f767_facts.toml"), "facts about the F767")
+# Not of a peripheral with an SVD: the trace unit, the debugger's, and the identifier (RM0410 45.1).
+ADDRESSES = {"UID": 0x1FF0F420}
+ONLY_HERE = ("DWT_", "DCB_", "DBGMCU_")  # in no SVD file
+NOT_IN_SVD = (
+    *("RCC_PLLCFGR_PLLR", "FLASH_OPTCR_NDBANK", "ADC_SMPR2_SMP3", "SCB_CCR_DC", "SCB_CCR_IC"),
+    *("SCB_CSSELR", "SCB_CPACR", "SCB_ICIALLU", "SCB_DCIMVAC", "SCB_DCISW"),
+)
 INTERRUPTS = {
     "DMA1_STREAM1": "DMA1_Stream1", "DMA1_STREAM3": "DMA1_Stream3", "DMA2_STREAM0": "DMA2_Stream0",
     "ADC": "ADC", "PVD": "PVD",
@@ -126,21 +119,23 @@ def test_everything_in_the_header_is_used():
 
 @pytest.mark.parametrize("name", sorted(BASES))
 def test_base(name):
-    if name in ADDRESSES:
-        assert BASES[name] == ADDRESSES[name]
+    known = {**FACTS["bases"], **ADDRESSES}
+    assert BASES[name] == known.get(name, BASES[name])
+    prefix = next((key for key in PERIPHERALS if name.startswith(key)), None)
+    if prefix is None or name == "ADC_COMMON":
+        assert name in known, f"{name} is checked against nothing"
         return
-    prefix = next(key for key in PERIPHERALS if name.startswith(key))
     assert BASES[name] == device(PERIPHERALS[prefix][0]).peripherals[name].base
 
 
 @pytest.mark.parametrize("name", sorted(REGISTERS))
 def test_register(name):
     owner, offset = REGISTERS[name]
-    if name in DWT_OFFSETS:
-        assert (owner, offset) == ("DWT_BASE", DWT_OFFSETS[name])
-    elif name in ONLY_F7:
-        assert offset == ONLY_F7[name]
-    else:
+    fact = FACTS["offsets"].get(name)
+    assert offset == (offset if fact is None else fact)
+    if name.startswith(ONLY_HERE):
+        assert fact is not None and owner == f"{name.split('_')[0]}_BASE"
+    elif name not in NOT_IN_SVD:
         found = register_of(name)
         assert found is not None, f"{name} is checked against nothing"
         assert offset == found[1].offset
@@ -153,13 +148,10 @@ def test_register(name):
 @pytest.mark.parametrize("name", sorted(BITS | POSITIONS))
 def test_field(name):
     bit = (BITS | POSITIONS)[name]
-    if name in ONLY_F7:
-        assert bit == ONLY_F7[name]
-        return
-    if name.startswith(("DWT_", "DCB_")):
-        assert (
-            bit == {"DWT_CTRL_CYCCNTENA": 0, "DCB_DEMCR_TRCENA": 24}[name]
-        )  # Armv7-M C1.8.7, C1.6.5
+    fact = FACTS["bits"].get(name)
+    assert bit == (bit if fact is None else fact)
+    if name.startswith(ONLY_HERE) or name in NOT_IN_SVD:
+        assert fact is not None, f"{name} is checked against nothing"
         return
     found = register_of(name)
     assert found is not None, f"{name} is checked against nothing"
@@ -167,6 +159,18 @@ def test_field(name):
     lowest, width = found[1].fields[field]
     assert bit == lowest
     assert name in RENAMED or (width == 1) == (name in BITS), f"{field} has {width} bits"
+
+
+@pytest.mark.parametrize(
+    ("kind", "defined"),
+    [
+        ("bases", BASES),
+        ("offsets", {name: offset for name, (_, offset) in REGISTERS.items()}),
+        ("bits", BITS | POSITIONS),
+    ],
+)
+def test_every_fact_is_in_the_header(kind, defined):
+    assert {name: defined.get(name) for name in FACTS[kind]} == FACTS[kind]
 
 
 def test_registers_of_one_stream_are_0x18_apart():
@@ -190,5 +194,6 @@ def test_interrupts():
     numbers = {
         name: int(value) for name, value in re.findall(r"^#define IRQ_(\w+) (\d+)u", TEXT, re.M)
     }
-    assert numbers.pop("COUNT") == 110  # RM0410 table 46
+    assert numbers == FACTS["interrupts"]
+    del numbers["COUNT"]
     assert numbers == {name: device(F4).interrupts[theirs] for name, theirs in INTERRUPTS.items()}

@@ -11,6 +11,7 @@ from eitskin_emulator.schedule import Event, Schedule
 LSI_TICKS = period_ticks(32_000)
 START, UNLOCK, RELOAD = 0xCCCC, 0x5555, 0xAAAA
 KR, PR, RLR, SR, WINR = (4 * k for k in range(5))
+APB1_FREEZE, DEVICE_ID = 0x8, 0x10016451
 RESET_VALUES = {KR: 0, PR: 0, RLR: 0xFFF, SR: 0, WINR: 0xFFF}
 
 
@@ -26,7 +27,7 @@ class Iwdg(Registers):
         self._clock, self._schedule = clock, schedule
         self._event = Event(lambda at: expired())
         self._on = self._open = False
-        self._busy_until = 0
+        self._busy_until = self._expires_at = 0
         self.feeds = 0
 
     def reset(self) -> None:
@@ -56,7 +57,7 @@ class Iwdg(Registers):
             self._on = self._on or value == START
             self.feeds += value == RELOAD
             if self._on and value in (START, RELOAD):
-                self._schedule.set(self._event, self._clock.now + self.timeout_ticks)
+                self._begin()
         elif offset == WINR:
             self.unmodelled("a window")
         elif not self._open:
@@ -65,4 +66,28 @@ class Iwdg(Registers):
             self._busy_until = self._clock.now + 5 * LSI_TICKS
             super().write(offset, size, value & (7 if offset == PR else 0xFFF))
             if self._on:
-                self._schedule.set(self._event, self._clock.now + self.timeout_ticks)
+                self._begin()
+
+    def hold(self, ticks: int) -> None:
+        """Stand still for so long."""
+        if self._on:
+            self._expires_at += ticks
+            self._schedule.set(self._event, self._expires_at)
+
+    def _begin(self) -> None:
+        self._expires_at = self._clock.now + self.timeout_ticks
+        self._schedule.set(self._event, self._expires_at)
+
+
+class DebugControl(Registers):
+    """DBGMCU, 0xE0042000 (RM0410 40.16): what a debugger's halt stops. Power resets it alone."""
+
+    name, base = "DBGMCU", 0xE0042000
+
+    def __init__(self, record: Record) -> None:
+        super().__init__(record, {0x0: DEVICE_ID, 0x4: 0, APB1_FREEZE: 0, 0xC: 0})
+
+    @property
+    def stops_watchdog(self) -> bool:
+        """Whether the watchdog stands still while the processor is halted."""
+        return bool(self.values[APB1_FREEZE] >> 12 & 1)

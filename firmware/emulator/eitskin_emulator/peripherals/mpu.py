@@ -1,16 +1,14 @@
 """The memory protection unit (ARMv7-M manual B3.5): its registers, and regions without access.
 
-Unicorn cannot forbid less than a page, so a forbidden ITCM is closed, and a smaller forbidden
-region (a stack's guard) is
-watched: what was stored in it is found when the slice ends, and is the fault that silicon raises at
-    the store itself; a load
-is not found. Attributes (cached or not) serve ``cached``; execute-never and unprivileged access are
-not enforced.
+ITCM is closed, or open for reading alone, in pages of 2 KB. A forbidden region in RAM (a stack's
+guard) is watched: what was stored in it is found when the slice ends, and is the fault that silicon
+raises at the store itself; a load is not found. Attributes (cached or not) serve ``cached``;
+execute-never and unprivileged access are not enforced.
 """
 
 from dataclasses import dataclass
 
-from eitskin_emulator.memory import ITCM_BYTES, RAM, RAM_BYTES, Memories
+from eitskin_emulator.memory import ITCM_BYTES, ITCM_PAGE, RAM, RAM_BYTES, Memories
 
 REGIONS = 8
 MAX_WATCHED = 4096
@@ -43,6 +41,11 @@ class MpuRegion:
         return self.attributes >> 24 & 7 == 0
 
     @property
+    def read_only(self) -> bool:
+        """Nobody may store."""
+        return self.attributes >> 24 & 7 >= 5
+
+    @property
     def cached(self) -> bool:
         """Normal memory that the data cache may hold (TEX, C, B)."""
         tex, c, b = self.attributes >> 19 & 7, self.attributes >> 17 & 1, self.attributes >> 16 & 1
@@ -56,7 +59,7 @@ class Mpu:
 
     def __init__(self, memories: Memories) -> None:
         self._memories = memories
-        self._itcm_denied = False
+        self._itcm = [(False, False)] * (ITCM_BYTES // ITCM_PAGE)  # each page: denied, read only
         self.reset()
 
     def reset(self) -> None:
@@ -121,10 +124,12 @@ class Mpu:
         self._follow()
 
     def _follow(self) -> None:
-        denied = bool(self._control & 1) and all(self.denies(at) for at in (0, ITCM_BYTES - 4))
-        if denied != self._itcm_denied:
-            self._itcm_denied = denied
-            self._memories.deny_itcm(denied)
+        for page, before in enumerate(self._itcm):
+            region = self.region(page * ITCM_PAGE)
+            wanted = (region is not None and region.denies, region is not None and region.read_only)
+            if wanted != before:
+                self._itcm[page] = wanted
+                self._memories.protect_itcm(page * ITCM_PAGE, *wanted)
         self._watch()
 
     def _watch(self) -> None:

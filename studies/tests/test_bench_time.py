@@ -1,0 +1,40 @@
+"""A frame's time as a range: what the table and the sentence say of two bounds."""
+
+import pytest
+
+from eitskin_studies.benchmarks.time_range import BoundedFrame, TimeRange, for_page, table
+from study_pages import page_copy
+
+
+def frame(bound: str, solve_us: int, switch_us: float, scan: str = "104 rows") -> BoundedFrame:
+    stages = {"demodulate": 500, "solve": solve_us, "touches": 3000, "send": 30}
+    return BoundedFrame("now", scan, bound, 10_400, stages, 1.5, switch_us, 4.5, 0.0)
+
+
+def result(solve_us: int) -> TimeRange:
+    rows = [
+        frame(bound, us, switch_us, scan)
+        for scan in ("208 rows", "104 rows")
+        for bound, us, switch_us in (("optimistic", 6000, 1.5), ("pessimistic", solve_us, 3.4))
+    ]
+    return TimeRange("two_touch", 4, tuple(rows))
+
+
+def test_a_row_goes_from_one_bound_to_the_other():
+    head, rows = table(result(15_000))
+    row = dict(zip(head, rows[1], strict=True))
+    assert row["rows"] == "104 rows" and row["solve, ms"] == "6.00 to 15.00"
+    assert row["frames a second"] == "56 to 96" and row["switched after, µs"] == "1.50 to 3.40"
+
+
+@pytest.mark.parametrize(("solve_us", "claim"), [(15_000, "does not support"), (8_000, "supports")])
+def test_88_frames_are_claimed_only_where_the_pessimistic_bound_has_them(solve_us, claim):
+    assert f"This bound {claim} the 88" in for_page(result(solve_us), "x")[0]["time-run"]
+
+
+def test_the_page_has_the_marks(tmp_path):
+    from eitskin_studies.harness.sections import fill_marks
+
+    page = page_copy(tmp_path, "board-cost")
+    fill_marks(page, "board-cost", for_page(result(15_000), "eitskin bench time"))
+    assert "6.00 to 15.00" in page.read_text(encoding="utf-8")
