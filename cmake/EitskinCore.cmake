@@ -40,6 +40,7 @@ function(eitskin_add_core name)
         ${name} PUBLIC $<BUILD_INTERFACE:${root}/include> $<INSTALL_INTERFACE:include>
         PRIVATE ${root}/src)
     target_compile_options(${name} PRIVATE ${EITSKIN_WARNINGS} ${EITSKIN_ARITHMETIC})
+    target_compile_definitions(${name} PRIVATE EITS_CONTRACTION_OFF)
     set_target_properties(${name} PROPERTIES C_VISIBILITY_PRESET hidden)
     if(CORE_DOUBLE)
         target_compile_definitions(${name} PUBLIC EITS_DOUBLE)

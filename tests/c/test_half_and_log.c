@@ -27,6 +27,34 @@ TEST(halves)
     }
 }
 
+#ifndef EITS_OWN_FMA /* else the C library's is not exact */
+/* The sum in floats of all exponents, of which half nearly cancel the product or lie halfway. */
+TEST(own_fused_multiply_add_is_the_librarys)
+{
+    static const uint32_t special[] = {0,           1,           0x80000000u, 0x007FFFFFu,
+                                       0x00800000u, 0x7F7FFFFFu, 0x7F800000u, 0xFF800000u,
+                                       0x7FC00000u, 0x3F800000u, 0x33800000u, 0x33800001u};
+    const uint32_t specials = COUNT_OF(special);
+    uint64_t state = 1;
+    for (uint32_t k = 0; k < 200000; ++k) {
+        uint32_t bits[3];
+        float number[3];
+        for (int i = 0; i < 3; ++i) {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            bits[i] = (uint32_t)(state >> 32);
+            if ((state >> 8 & 15u) == 0)
+                bits[i] = special[(state >> 12) % specials];
+        }
+        memcpy(number, bits, sizeof number);
+        if (k % 2 == 0)
+            number[2] = -number[0] * number[1] * (k % 4 == 0 ? 1.0f : 0x1p-24f);
+        const float expected = fmaf(number[0], number[1], number[2]),
+                    got = eits_float_fma(number[0], number[1], number[2]);
+        CHECK(memcmp(&got, &expected, sizeof got) == 0 || (isnan(got) && isnan(expected)));
+    }
+}
+#endif
+
 static eits_real next_after(eits_real q)
 {
 #ifdef EITS_DOUBLE

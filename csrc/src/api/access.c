@@ -1,6 +1,7 @@
 /* These functions read a context for its users. The struct is private so that its members can
  * change without a change of the interface. Pointers stay valid as long as the context; the numbers
  * behind them are those of the last frame and change with the next. */
+#include "base/arithmetic.h"
 #include "context/context.h"
 
 const eits_model *eits_get_model(const eits_context *ctx)

@@ -4,16 +4,15 @@
 #define EITSKIN_VEC_H
 
 #include "base/arithmetic.h"
+#include "base/fma.h"
 
 #include <math.h>
 #include <string.h>
 
 #ifdef EITS_DOUBLE
-#define eits_fma  fma
 #define eits_sqrt sqrt
 #define eits_fabs fabs
 #else
-#define eits_fma  fmaf
 #define eits_sqrt sqrtf
 #define eits_fabs fabsf
 #endif

@@ -8,6 +8,7 @@
  *
  * Only speed depends on the cache. Unpacking is exact, so results have the same bits without it. */
 #include "context/column_cache.h"
+#include "base/arithmetic.h"
 
 #include <string.h>
 

@@ -1,6 +1,7 @@
 /* S'v and S x on a context: the two products that a frame's time goes to, n_pixels x rank and
  * nonzeros x rank multiply-accumulates. Callers count them; these do not. */
 #include "context/products.h"
+#include "base/arithmetic.h"
 
 void eits_apply_t(const eits_context *ctx, const eits_real *v, eits_real *out)
 {

@@ -2,6 +2,7 @@
 #include "eitskin/model.h"
 #include "eitskin/solve.h"
 
+#include "base/arithmetic.h"
 #include "model/options.h"
 #include "model/sections.h"
 

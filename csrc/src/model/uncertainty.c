@@ -4,6 +4,7 @@
  * so a diagonal below zero shows a damaged or invented file. Whether they are positive semidefinite
  * is not checked here, since the code that uses them (evidence/covariance.c) adds noise and limits
  * its pivots from below. */
+#include "base/arithmetic.h"
 #include "model/sections.h"
 
 enum { HEAD = 16 };

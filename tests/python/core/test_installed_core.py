@@ -4,6 +4,7 @@ subproject."""
 import re
 import shutil
 import subprocess
+import tarfile
 from importlib import resources
 from pathlib import Path
 
@@ -59,6 +60,8 @@ def test_an_example_says_what_is_wrong_with_a_file(programs, tmp_path):
 
 
 def test_pkg_config_gives_what_a_compiler_needs(prefix, tmp_path):
+    """Also from a prefix that was moved."""
+    prefix = shutil.copytree(prefix, tmp_path / "elsewhere")
     tool = shutil.which("pkg-config")
     assert tool, "pkg-config is missing; install it:  apt-get install pkgconf"
     for name in ("eitskin", "eitskin64"):
@@ -81,6 +84,24 @@ def test_as_a_subproject_it_brings_neither_tests_nor_werror(tmp_path):
     assert "-Werror" not in rules
     assert "tests/c" not in rules
     assert "firmware" not in rules
+
+
+def test_fetched_content_is_the_core_alone(tmp_path):
+    """From an archive, as from a repository."""
+    archive = tmp_path / "eitskin.tar.gz"
+    with tarfile.open(archive, "w:gz", compresslevel=1) as tar:
+        for name in ("CMakeLists.txt", "cmake", "csrc"):
+            tar.add(ROOT / name, f"eitskin/{name}")
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\nproject(user LANGUAGES C)\ninclude(FetchContent)\n"
+        f"FetchContent_Declare(eitskin URL {archive} DOWNLOAD_EXTRACT_TIMESTAMP ON)\n"
+        "FetchContent_MakeAvailable(eitskin)\n"
+        f'add_executable(user "{EXAMPLES}/minimal.c")\n'
+        "target_link_libraries(user PRIVATE eitskin::core)\n"
+    )
+    run("cmake", "-S", tmp_path, "-B", tmp_path / "build", "-G", "Ninja")
+    rules = (tmp_path / "build" / "build.ninja").read_text()
+    assert "csrc/src/solve/fista.c" in rules and "fw_app" not in rules and "-Werror" not in rules
 
 
 def test_memory_table_of_the_page_is_what_the_macros_give(programs):

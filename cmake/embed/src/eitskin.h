@@ -1,0 +1,2 @@
+/* The header that Arduino looks for. */
+#include "eitskin/eitskin.h"
