@@ -99,6 +99,11 @@ class DeviceError(EitskinError):
     exit_code = 12  # 11 is the doctor's
 
 
+class SkinTouchedError(DeviceError):
+    """A board's reference was not taken, because something touches the skin or moves on it. The
+    reference before it stays."""
+
+
 class SinkError(EitskinError):
     """An output for touches cannot be opened: its port is taken, or nobody answers."""
 

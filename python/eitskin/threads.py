@@ -126,6 +126,11 @@ class OneReader:
             self._reader = self._thread = None
             return True
 
+    @property
+    def idle(self) -> bool:
+        """Nobody reads."""
+        return self._reader is None
+
     def check(self) -> None:
         """Raise a UsageError if another thread reads."""
         with self._lock:

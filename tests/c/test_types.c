@@ -29,6 +29,7 @@ TEST(status_texts)
         {EITS_E_REFERENCE_SHORT, "too few frames"},
         {EITS_E_NOT_FINITE, "finite"},
         {EITS_E_ARITHMETIC, "-ffp-contract=off"},
+        {EITS_E_REFERENCE_TOUCHED, "untouched"},
     };
     const int count = (int)COUNT_OF(known);
     for (int i = 0; i < count; ++i) {

@@ -297,6 +297,54 @@ TEST(test_failed_tare)
     CHECK(peak < 1e-5f);
 }
 
+/* A tare in which something lands on the skin is refused, and the last reference stays. */
+TEST(test_tare_of_a_skin_that_is_touched_meanwhile)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    TARE(16);
+    static float v0[256];
+    const fw_engine *engine = &b.host.instrument.solve.engine;
+    memcpy(v0, engine->ctx->reference.v0, sizeof(float) * 208);
+    eits_command_tare tare = {.request = ++b.host.request, .frames = 16};
+    host_send(&b.host, EITS_PACKET_TARE, &tare, sizeof tare);
+    host_run(&b.host, 180); /* half of it */
+    touch(0, 0, 5);
+    const eits_packet_reply reply = host_reply(&b.host, tare.request);
+    CHECK_EQUAL(reply.status, EITS_REPLY_CORE);
+    CHECK_EQUAL(reply.detail[0], EITS_E_REFERENCE_TOUCHED);
+    CHECK(same_bits(v0, engine->ctx->reference.v0, sizeof(float) * 208));
+    CHECK_EQUAL(host_info(&b.host).tared, 1);
+}
+
+/* A tare can be undone once: the reference before it comes back, with the options that were set
+ * since. */
+TEST(test_undo_of_a_tare)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    static float v0[256];
+    const fw_engine *engine = &b.host.instrument.solve.engine;
+    TARE(16);
+    CHECK_EQUAL(host_tare(&b.host, 0).status, EITS_REPLY_NOT_TARED); /* there was none before */
+    memcpy(v0, engine->ctx->reference.v0, sizeof(float) * 208);
+    touch(0, 0, 5);
+    TARE(16);
+    CHECK(!same_bits(v0, engine->ctx->reference.v0, sizeof(float) * 208));
+    eits_options options = *eits_get_options(engine->ctx);
+    options.iterations = 7;
+    CHECK_OK(fw_solve_set_options(&b.host.instrument.solve, &options));
+    TARE(0);
+    CHECK(same_bits(v0, engine->ctx->reference.v0, sizeof(float) * 208));
+    CHECK_EQUAL(eits_get_options(engine->ctx)->iterations, 7);
+    CHECK_EQUAL(host_tare(&b.host, 0).status, EITS_REPLY_NOT_TARED);
+    TARE(16);
+    TAKEN(mask_row(17, 1));
+    CHECK_EQUAL(host_tare(&b.host, 0).status, EITS_REPLY_NOT_TARED); /* other masks */
+    TAKEN(mask_row(17, 0));
+    TARE(16);
+    TAKEN(host_plain(&b.host, EITS_PACKET_SELF_TEST));
+    CHECK_EQUAL(host_tare(&b.host, 0).status, EITS_REPLY_NOT_TARED); /* its place was needed */
+}
+
 /* Frames whose scan began before the command do not count as untouched. All frames of a tare are
  * sent, whatever `every` is. */
 TEST(test_reference_frames)

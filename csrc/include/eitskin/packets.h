@@ -93,7 +93,7 @@ typedef enum eits_reply_status {
     EITS_REPLY_RANGE = 3,
     /* no model is in use: send one first */
     EITS_REPLY_NO_MODEL = 4,
-    /* there is no reference: send a TARE first */
+    /* there is no reference: send a TARE first; of a TARE: none to bring back */
     EITS_REPLY_NOT_TARED = 5,
     /* [0] type of the command under way */
     EITS_REPLY_BUSY = 6,
@@ -587,7 +587,7 @@ typedef struct eits_command_stream {
 typedef struct eits_command_tare {
     /* never 0; the reply repeats it */
     uint32_t request;
-    /* 1, or 4 to 1024 */
+    /* 1, or 4 to 1024; 0: the reference before the last tare comes back, where it is kept */
     uint32_t frames;
 } eits_command_tare;
 

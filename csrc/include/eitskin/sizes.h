@@ -176,11 +176,11 @@ extern "C" {
 #define EITS_FOLLOWED_SIZE \
     (sizeof(eits_touch) + 5u * sizeof(eits_real) + (sizeof(eits_real) == 8u ? 16u : 12u))
 
-/* Single numbers of the parts: 20 reals of reference and whitening, the shift of places by terms
- * along x and y; 34 counts and flags; and 12 parts, each of which ends at a multiple of eight
+/* Single numbers of the parts: 23 reals of reference and whitening, the shift of places by terms
+ * along x and y; 35 counts and flags; and 13 parts, each of which ends at a multiple of eight
  * bytes. */
 #define EITS_CONTEXT_NUMBERS \
-    ((20u + 2u * EITS_MAX_MOVE_TERMS) * sizeof(eits_real) + (34u + 12u) * sizeof(uint32_t))
+    ((23u + 2u * EITS_MAX_MOVE_TERMS) * sizeof(eits_real) + (35u + 13u) * sizeof(uint32_t))
 
 /* The multipole model keeps a pixel and a mirror per touch, the joint fit its gradient. */
 #define EITS_JOINT_NUMBERS                                            \

@@ -58,7 +58,9 @@ typedef enum eits_status {
     /* the core was compiled so that its results differ in bits from a model's golden frame: with
      * contraction (compile with -ffp-contract=off), with sums in another order, or for a processor
      * that does not round to nearest */
-    EITS_E_ARITHMETIC = -16
+    EITS_E_ARITHMETIC = -16,
+    /* something touched the skin, or moved on it, while the reference was taken */
+    EITS_E_REFERENCE_TOUCHED = -17
 } eits_status;
 
 /* One line of English for a status; never NULL. It is meant for people. Programs compare the

@@ -81,6 +81,7 @@ eits_status eits_reference_begin(eits_context *ctx, uint32_t count)
     b->noise_v = 0;
     b->outliers = b->second_waits = 0;
     b->tracking = (eits_reference_tracking){0};
+    b->still = (eits_stillness){0};
     return EITS_OK;
 }
 
@@ -118,6 +119,7 @@ eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t
     /* If two frames differ in a reading, the third frame decides which one is wrong. From then on
      * frames are compared with the mean. */
     if (b->count == 1 && judged) {
+        eits_compare_stillness(ctx, frame);
         eits_keep_second_frame(ctx, frame);
         return EITS_OK;
     }
@@ -127,6 +129,8 @@ eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t
     }
     const uint32_t left =
         b->count >= 2 && judged ? eits_reference_mask_outliers(ctx, &ctx->scratch, frame) : 0;
+    if (b->count > 0)
+        eits_compare_stillness(ctx, frame);
     /* The second half is compared with the mean of the first: a frame compared with a mean that
      * contains it would show too little noise. noise_v of the frames so far is enough to raise the
      * regularisation as it will be raised for later frames. */
@@ -155,6 +159,8 @@ eits_status eits_reference_finish(eits_context *ctx)
     eits_reference *b = &ctx->reference;
     if (b->count < EITS_MIN_REFERENCE_FRAMES || b->count != b->wanted)
         return EITS_E_REFERENCE_SHORT;
+    if (eits_wants(ctx, EITS_DIAGNOSTIC_STALE_REFERENCE) && eits_reference_moved(ctx))
+        return EITS_E_REFERENCE_TOUCHED;
     const eits_status status = fit(ctx);
     if (status != EITS_OK)
         return status;

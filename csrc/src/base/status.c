@@ -39,6 +39,9 @@ const char *eits_status_text(eits_status status)
     case EITS_E_ARITHMETIC:
         return "the core's arithmetic has other bits; compile it with -ffp-contract=off, round to "
                "nearest";
+    case EITS_E_REFERENCE_TOUCHED:
+        return "something landed, moved or lifted on the skin while the reference was taken; leave "
+               "the skin untouched and take it again";
     }
     return "unknown status";
 }

@@ -29,6 +29,14 @@ typedef struct eits_reference_tracking {
 } eits_reference_tracking;
 #define EITS_TOUCHES_UNKNOWN UINT32_MAX
 
+/* How much the frames of a reference differ from the mean before them, in m2_unit^2: the common
+ * part of the changes of reciprocal rows, their difference, and the rows themselves, summed over
+ * `pairs`. Written by frame/reference. */
+typedef struct eits_stillness {
+    eits_real common, apart, size;
+    uint32_t pairs;
+} eits_stillness;
+
 /* The reference frame and its noise. Written by frame/reference. */
 typedef struct eits_reference {
     /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them */
@@ -63,6 +71,7 @@ typedef struct eits_reference {
     /* V: a power of two near the greatest voltage of the first reference frame, so that squares
      * neither overflow nor vanish */
     eits_real m2_unit;
+    eits_stillness still;
     uint32_t wanted;       /* the number of frames to learn from */
     uint32_t second_waits; /* 1: the second reference frame is in m2, until the third one comes */
 } eits_reference;

@@ -41,6 +41,20 @@
  * NOISE_ROUNDING */
 #define EITS_MAX_OF_NOISE R(3.5)
 
+/* ---- Chosen: on tares of 4 to 1024 frames at 40, 60 and 80 dB, with 16 single touches of radius 5
+ * to 10 mm and contrast 1.5 to 8 that land, lift, tap or rise within them (seed 5), and on the
+ * untouched frames of the library's scenes: largest ratio 1.13 (a gel that dries), largest common
+ * part .024 % of the reference. Check: scripts/test tests/python/solve/test_tare_touched.py */
+
+/* a reference is touched if the common part of the changes of reciprocal rows exceeds their
+ * difference by more than chance gives [deviations]. larger: touches at 40 dB go unnoticed;
+ * smaller: noise is taken for a touch */
+#define EITS_MOVED_DEVIATIONS R(5.0)
+
+/* and so much, rms [of the reference]. larger: light touches go unnoticed; smaller: skins that dry
+ * or warm up are refused */
+#define EITS_MOVED_FRACTION R(0.001)
+
 /* ---- Chosen: guards: a touch changes a row by less. Study constants: MAX_RATIO changes 6 scenes
  * with faults and no exact frame, RATIO_DEFINED nothing. Check: ctest --preset host -R frame_f */
 

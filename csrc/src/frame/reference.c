@@ -273,3 +273,89 @@ void eits_take_second_frame(eits_context *ctx)
     }
     b->second_waits = 0;
 }
+
+/* ---- stillness ----
+ *
+ * Whether the skin stayed untouched while a reference was learned.
+ *
+ * Noise, mains hum and single bad readings change a row and its reciprocal independently of each
+ * other. A touch that lands, moves or lifts changes both alike. So each frame is compared with the
+ * mean so far, pair by pair, and two energies are summed: that of the common part of a pair's
+ * changes, and that of their difference. Without a touch they are equal up to chance. The common
+ * part along the reference itself is left out, because drift of the gain is no touch.
+ *
+ * A frame whose pairs agree to the last bit was measured by half, and shows nothing. Protocols
+ * without reciprocals, and references from a single frame, are not examined. */
+
+/* Returns 1 if both rows of the fold are in use. */
+static int is_pair(const eits_context *ctx, eits_fold fold)
+{
+    const eits_real *v0 = ctx->reference.v0;
+    return fold.first != EITS_FOLD_NONE && fold.second != EITS_FOLD_NONE &&
+           !ctx->rows.masked[fold.first] && !ctx->rows.masked[fold.second] &&
+           eits_is_finite(v0[fold.first]) && eits_is_finite(v0[fold.second]);
+}
+
+static int measured_in_full(const eits_context *ctx, const eits_real *frame)
+{
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const eits_fold fold = ctx->model->fold[k];
+        if (is_pair(ctx, fold) && frame[fold.first] != (eits_real)fold.sign * frame[fold.second])
+            return 1;
+    }
+    return 0;
+}
+
+/* The parts of fold k's reference and change, in units of m2_unit; returns 0 if the fold is no pair
+ * in use. */
+static int parts(const eits_context *ctx, uint32_t k, const eits_real *frame, eits_real *reference,
+                 eits_real *common, eits_real *apart)
+{
+    const eits_reference *b = &ctx->reference;
+    const eits_fold fold = ctx->model->fold[k];
+    if (!is_pair(ctx, fold))
+        return 0;
+    const eits_real sign = (eits_real)fold.sign,
+                    first = (frame[fold.first] - b->v0[fold.first]) / b->m2_unit,
+                    second = sign * (frame[fold.second] - b->v0[fold.second]) / b->m2_unit;
+    *reference = (b->v0[fold.first] + sign * b->v0[fold.second]) / b->m2_unit;
+    *common = first + second;
+    *apart = first - second;
+    return 1;
+}
+
+void eits_compare_stillness(eits_context *ctx, const eits_real *frame)
+{
+    eits_reference *b = &ctx->reference;
+    eits_real size = 0, along = 0, reference, common, apart;
+    if (!measured_in_full(ctx, frame))
+        return;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        if (!parts(ctx, k, frame, &reference, &common, &apart))
+            continue;
+        size = eits_fma(reference, reference, size);
+        along = eits_fma(reference, common, along);
+    }
+    const eits_real slope = size > 0 ? along / size : 0;
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        if (!parts(ctx, k, frame, &reference, &common, &apart))
+            continue;
+        const eits_real rest = eits_fma(-slope, reference, common);
+        b->still.common = eits_fma(rest, rest, b->still.common);
+        b->still.apart = eits_fma(apart, apart, b->still.apart);
+        ++b->still.pairs;
+    }
+    b->still.size += size;
+}
+
+int eits_reference_moved(const eits_context *ctx)
+{
+    const eits_stillness *still = &ctx->reference.still;
+    if (still->pairs == 0)
+        return 0;
+    /* Each energy is that of `pairs` normal numbers: its relative deviation is sqrt(2 / pairs), and
+     * that of the ratio sqrt(4 / pairs). */
+    const eits_real limit = 1 + EITS_MOVED_DEVIATIONS * 2 / eits_sqrt((eits_real)still->pairs),
+                    min = EITS_MOVED_FRACTION * EITS_MOVED_FRACTION * still->size;
+    return still->common > limit * still->apart && still->common - still->apart > min;
+}

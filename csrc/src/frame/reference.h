@@ -38,6 +38,12 @@ void eits_take_reference_frame(eits_context *ctx, const eits_real *frame);
 void eits_keep_second_frame(eits_context *ctx, const eits_real *frame);
 void eits_take_second_frame(eits_context *ctx);
 
+/* Compare a further reference frame with the mean so far; add to reference.still. */
+void eits_compare_stillness(eits_context *ctx, const eits_real *frame);
+
+/* Returns 1 if the frames that were compared differ as by a touch that landed, moved or lifted. */
+int eits_reference_moved(const eits_context *ctx);
+
 /* ---- places.c ---- */
 
 /* -N'y, -M'y and minus the rest of y (model.h, eits_uncertainty). */

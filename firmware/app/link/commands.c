@@ -5,6 +5,7 @@
 #include "app/link/report.h"
 #include "app/link/scanning.h"
 #include "app/link/state.h"
+#include "app/link/stream.h"
 #include "app/link/tracks.h"
 #include "app/link/upload.h"
 #include "app/safety/current_enable.h"
@@ -108,11 +109,17 @@ static fw_answer on_tare(fw_host_link *link, const void *payload, size_t size)
     (void)size;
     memcpy(&c, payload, sizeof c);
     const size_t at = offsetof(eits_command_tare, frames);
-    if (outside(&bad, at, c.frames, 1, FW_TARE_MAX) ||
+    if (outside(&bad, at, c.frames, 0, FW_TARE_MAX) ||
         (c.frames > 1 && outside(&bad, at, c.frames, 4, FW_TARE_MAX)))
         return bad;
     if (fw_solve_model(link->solve) == NULL)
         return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
+    if (c.frames == 0) {
+        if (!fw_tare_undo(link->solve))
+            return fw_refuse(EITS_REPLY_NOT_TARED, 0, 0);
+        fw_reference_changed(link);
+        return ok();
+    }
     if (!fw_current_on(link->safety))
         return fw_refuse(EITS_REPLY_TRIPPED, 0, 0);
     fw_tare_begin(link->solve, c.request, c.frames);

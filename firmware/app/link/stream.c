@@ -130,6 +130,12 @@ static void check_deadline(fw_host_link *link, const fw_frame *frame, uint32_t n
                  (fw_fault_detail){.value = missed ? (int32_t)(late - period) : 0});
 }
 
+void fw_reference_changed(fw_host_link *link)
+{
+    (void)eits_gestures_init(&link->events.gestures, NULL); /* ids begin again, too */
+    fw_diagnostics_new_reference(link->safety);
+}
+
 static void take_tare(fw_host_link *link, const fw_frame *frame, const fw_quality *quality)
 {
     eits_status status = EITS_OK;
@@ -138,8 +144,7 @@ static void take_tare(fw_host_link *link, const fw_frame *frame, const fw_qualit
     if (step == FW_TARE_TAKEN || step == FW_TARE_DONE)
         send_raw(link, frame, EITS_RAW_REFERENCE);
     if (step == FW_TARE_DONE) {
-        (void)eits_gestures_init(&link->events.gestures, NULL); /* ids begin again, too */
-        fw_diagnostics_new_reference(link->safety);
+        fw_reference_changed(link);
         fw_send_tare_reply(link, (fw_answer){0});
     }
     if (step == FW_TARE_FAILED)

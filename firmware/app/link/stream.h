@@ -12,4 +12,7 @@ void fw_stream_frame(fw_host_link *link, fw_frame *frame);
 /* Stream nothing, as after a start. */
 void fw_stream_reset(fw_host_link *link);
 
+/* There is another reference than before: fingers and faults of the old one are forgotten. */
+void fw_reference_changed(fw_host_link *link);
+
 #endif

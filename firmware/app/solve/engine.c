@@ -123,7 +123,7 @@ eits_status fw_engine_open(fw_engine *engine, const eits_model *model)
 
 void fw_engine_close(fw_engine *engine)
 {
-    engine->open = engine->tared = engine->phase_known = false;
+    engine->open = engine->tared = engine->phase_known = engine->saved.before_tare = false;
     engine->cosine = 1;
     engine->sine = 0;
     engine->used_bytes = 0;
@@ -154,6 +154,7 @@ void fw_engine_save(fw_engine *engine)
     saved->sine = engine->sine;
     saved->tared = engine->tared;
     saved->phase_known = engine->phase_known;
+    saved->before_tare = false;
 }
 
 void fw_engine_restore(fw_engine *engine)

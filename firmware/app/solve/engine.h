@@ -11,6 +11,7 @@ typedef struct fw_saved {
     uint8_t *core; /* written by eits_save, at the workspace's end */
     float cosine, sine;
     bool tared, phase_known;
+    bool before_tare; /* it is the reference before the last tare, which can be undone */
 } fw_saved;
 
 typedef struct fw_engine {

@@ -34,6 +34,7 @@ void fw_solve_scan_changed(fw_solve *solve)
 {
     fw_engine_set_noise_floor(&solve->engine, fw_acquire_noise_floor_v(solve->acquire));
     solve->engine.tared = solve->engine.phase_known = false;
+    solve->engine.saved.before_tare = false;
 }
 
 void fw_solve_phase_changed(fw_solve *solve)
@@ -54,6 +55,7 @@ eits_status fw_solve_set_options(fw_solve *solve, const eits_options *options)
 void fw_solve_mask_row(fw_solve *solve, uint32_t row, bool masked)
 {
     (void)eits_mask_row(solve->engine.ctx, row, masked);
+    solve->engine.saved.before_tare = false;
 }
 
 const float *fw_solve_image(const fw_solve *solve)

@@ -2,6 +2,7 @@
 
 #include "app/clock.h"
 #include "app/solve/state.h"
+#include "app/solve/tracker.h"
 
 void fw_tare_begin(fw_solve *solve, uint32_t request, uint32_t frames)
 {
@@ -60,7 +61,9 @@ fw_tare_step fw_tare_add(fw_solve *solve, const fw_frame *frame, eits_status *st
     if (!fw_tare_wants(solve, frame))
         return FW_TARE_NOT_YET;
     *status = add(tare, engine, frame);
-    if (*status != EITS_OK && ++tare->refused > FW_TARE_REFUSED) {
+    /* the core finds a touch once all frames are in; further frames cannot change that */
+    const bool touched = *status == EITS_E_REFERENCE_TOUCHED;
+    if (touched || (*status != EITS_OK && ++tare->refused > FW_TARE_REFUSED)) {
         (void)fw_tare_abort(solve);
         return FW_TARE_FAILED;
     }
@@ -69,7 +72,22 @@ fw_tare_step fw_tare_add(fw_solve *solve, const fw_frame *frame, eits_status *st
     if (++tare->taken < tare->wanted)
         return FW_TARE_TAKEN;
     tare->active = false;
+    engine->saved.before_tare = engine->saved.tared;
     engine->tared = engine->phase_known = true;
     eits_forget(engine->ctx);
     return FW_TARE_DONE;
+}
+
+bool fw_tare_undo(fw_solve *solve)
+{
+    fw_engine *engine = &solve->engine;
+    if (!engine->saved.before_tare)
+        return false;
+    const eits_options options = *eits_get_options(engine->ctx); /* may have been set since */
+    fw_engine_restore(engine);
+    (void)eits_set_options(engine->ctx, &options);
+    eits_forget(engine->ctx);
+    fw_tracker_forget(solve);
+    engine->saved.before_tare = false;
+    return true;
 }

@@ -36,4 +36,8 @@ fw_tare_step fw_tare_add(fw_solve *solve, const fw_frame *frame, eits_status *st
 /* Give up: the last reference is back. Returns whether a tare was active. */
 bool fw_tare_abort(fw_solve *solve);
 
+/* Bring back the reference that the last tare replaced. Returns false if it is not kept: there was
+ * none, it has been brought back already, or scan, model or masks have changed since. */
+bool fw_tare_undo(fw_solve *solve);
+
 #endif

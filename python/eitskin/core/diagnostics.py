@@ -58,7 +58,8 @@ def words(found: DiagnosticFields) -> tuple[str, ...]:
         "model mismatch": f"model mismatch {100 * found.model_mismatch:.1f} %"
         if found.model_mismatch > 0
         else "model mismatch",
-        "stale reference": "stale reference: tare again",
+        "stale reference": "stale reference: the skin was touched while it was taken, or has"
+        " changed since; leave it untouched and tare again",
         "crowded": "crowded: more touches than can be separated",
         "unlike the model": "unlike the model: see  eitskin doctor",
     }

@@ -5,6 +5,7 @@ from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from eitskin.core.diagnostics import names
 from eitskin.core.options_table import CHOICES
 from eitskin.core.results import Options, check_options
 from eitskin.device.exchange import ANSWER_S, CommandExchange
@@ -14,12 +15,17 @@ from eitskin.device.streaming import LEAVE_S, packet_stream
 from eitskin.device.timing import check_name
 from eitskin.device.upload import upload
 from eitskin.device.wire import link_table as commands
+from eitskin.device.wire.explain import found_touched, reply_text
 from eitskin.device.wire.link_table import Setting, Stream
-from eitskin.device.wire.packets import BoardHashes, BoardInfo, BoardStats
-from eitskin.errors import DeviceError, UsageError
+from eitskin.device.wire.packets import BoardHashes, BoardInfo, BoardStats, SolvedTouches
+from eitskin.errors import DeviceError, SkinTouchedError, UsageError
 from eitskin.threads import OneThreadAtATime
 
 TARE_FRAMES = 16
+LOOK_FRAMES = 2  # that show whether something touches the skin
+LOOK_CONFIDENCE = 0.7
+# with these, what looks like a touch may come of a reference that does not fit any more
+LOOK_UNSURE = {"model mismatch", "stale reference", "unlike the model"}
 
 
 def _asked_millihz(info: BoardInfo) -> int:
@@ -42,6 +48,7 @@ class Device(CommandExchange):
     as ``CommandExchange``. ``pacer`` holds frames back as ``?speed=`` of the URL says."""
 
     pacer: Pacer | None = None
+    can_undo_tare = False  # as far as this program knows
 
     # ---- commands ----
 
@@ -51,17 +58,72 @@ class Device(CommandExchange):
         assert isinstance(answer, BoardStats)
         return answer
 
-    def tare(self, frames: int = TARE_FRAMES) -> None:
+    def tare(self, frames: int = TARE_FRAMES, *, anyway: bool = False) -> None:
         """Take the reference from ``frames`` (1, or 4 to 1024) frames of the untouched skin.
+
+        Before that, a board with a reference shows whether something touches the skin;
+        ``anyway`` leaves that out. Whether something moves while the reference is taken is always
+        examined.
 
         Raises:
             UsageError: another number of frames.
+            SkinTouchedError: something touches the skin or moves on it; the last reference stays.
             DeviceError: the board refuses, or its core the frames.
         """
+        check_tare_frames(frames)
         wait_s = 3.0 + 2e-6 * max(self.board.frame_us, 1000) * (frames + 4)
         with self.asking:
-            self.command(commands.Tare(check_tare_frames(frames)), wait_s)
+            if not anyway:
+                self.check_untouched()
+            self._tare(frames, wait_s)
+            self.can_undo_tare = bool(self.board.tared)
             self.board = replace(self.board, tared=1)
+
+    def _tare(self, frames: int, wait_s: float) -> None:
+        reply = self.send_command(commands.Tare(frames), wait_s)
+        if reply.ok:
+            return
+        text = f"{self.transport.name}: {reply_text(reply)}"
+        raise (SkinTouchedError if found_touched(reply) else DeviceError)(text)
+
+    def check_untouched(self) -> None:
+        """Look for touches by the reference that the board has. Without one, or while somebody
+        reads the frames, nothing is examined. Touches that a poor reference may cause do not count.
+
+        Raises:
+            SkinTouchedError: something touches the skin.
+        """
+        if not self.board.tared or not self.reader.idle:
+            return
+        seen = [
+            item
+            for item in self.stream(Stream.TOUCHES, frames=LOOK_FRAMES)
+            if isinstance(item, SolvedTouches)
+        ]
+        if not seen or LOOK_UNSURE & set(names(seen[-1].solved.diagnostics)):
+            return
+        places = [
+            f"({touch.x_mm:.0f}, {touch.y_mm:.0f}) mm"
+            for touch in seen[-1].touches
+            if touch.confidence is None or touch.confidence >= LOOK_CONFIDENCE
+        ]
+        if places:
+            raise SkinTouchedError(
+                f"{self.transport.name}: something touches the skin at {', '.join(places)}; lift"
+                " it, and take the reference then"
+            )
+
+    def undo_tare(self) -> None:
+        """Bring back the reference that the last tare replaced; what was solved with the new one
+        stays as it was.
+
+        Raises:
+            DeviceError: the board does not keep it: there was none, it has been brought back
+                already, or scan, model or masked rows have changed since.
+        """
+        with self.asking:
+            self.can_undo_tare = False
+            self.command(commands.Tare(0), ANSWER_S)
 
     def start_scene(self) -> int | None:
         """Begin what is to be touched, on a simulated or emulated board; call it after ``tare``.
@@ -116,6 +178,7 @@ class Device(CommandExchange):
             frame_period_us=now.frame_period_us if frame_period_us is None else frame_period_us,
         )
         self.command(command, 2 * ANSWER_S)
+        self.can_undo_tare = False
         return self.info()
 
     def solver(self, options: Options) -> None:
@@ -141,6 +204,7 @@ class Device(CommandExchange):
     def mask_row(self, row: int, *, masked: bool = True) -> None:
         """Leave protocol row ``row`` out of every frame, or use it again from the next tare on."""
         self.command(commands.MaskRow(row, int(masked)), ANSWER_S)
+        self.can_undo_tare = False
 
     def self_test(self) -> None:
         """Let the board run its model's golden frame.
@@ -149,6 +213,7 @@ class Device(CommandExchange):
             DeviceError: the image has other bits than the model states.
         """
         self.command(commands.SelfTest(), 10.0)
+        self.can_undo_tare = False
 
     def hashes(self) -> BoardHashes:
         """SHA-256 of the model in use and of the program, as the board's flash has them; of a
@@ -188,6 +253,7 @@ class Device(CommandExchange):
         """Restart the board and wait until it answers; its reference is gone."""
         with self.asking:
             self.command(commands.Reset(), ANSWER_S)
+            self.can_undo_tare = False
             self.link.connected = False  # that it restarts was asked for
             try:
                 return self.info()
@@ -206,6 +272,7 @@ class Device(CommandExchange):
         """
         with self.asking:
             upload(self, model, progress)
+            self.can_undo_tare = False
             return self.info()
 
     # ---- streaming ----

@@ -2,6 +2,7 @@
 (``Session.ask``), so that each one gets an answer; any thread may call them."""
 
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
@@ -15,7 +16,7 @@ from eitskin.device.known_model import KnownModel
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.timing import read_speed
 from eitskin.device.wire.link_table import Stream
-from eitskin.errors import EitskinError, FileError, UsageError
+from eitskin.errors import EitskinError, FileError, SkinTouchedError, UsageError
 from eitskin.model.eitm import decode_model
 from eitskin.page.reader import SessionReader
 from eitskin.session.session import Session
@@ -23,6 +24,7 @@ from eitskin.session.set_up import take_reference
 from eitskin.session.settings import KINDS
 from eitskin.tuning.front import named_preset
 
+AGAIN_S = 10.0
 T = TypeVar("T")
 Answer = Future[str] | str
 
@@ -40,6 +42,7 @@ class PageCommands:
 
     def __init__(self, reader: SessionReader) -> None:
         self._reader = reader
+        self._tare_again_s = 0.0  # until then a tare is taken although something touches the skin
 
     def do(self, what: object, value: object) -> Answer:
         """Carry out the command in a page's message."""
@@ -49,6 +52,8 @@ class PageCommands:
             return self.pace("speed", read_speed(str(value), "speed"))
         if what == "tare":
             return self.tare()
+        if what == "undo-tare":
+            return self.undo_tare()
         if what == "record":
             return self.record(value is True)
         if what == "mode" and isinstance(value, list):
@@ -64,11 +69,34 @@ class PageCommands:
         raise UsageError(f"{what}: {value!r} cannot be")
 
     def tare(self) -> Future[str]:
+        """Take the reference. Where something touches the skin, the next tare within ``AGAIN_S``
+        takes it all the same."""
         session = self._board("tare")
+        anyway, self._tare_again_s = time.monotonic() < self._tare_again_s, 0.0
 
         def action(device: Device) -> str:
-            take_reference(device, TARE_FRAMES, streamed=True)
+            try:
+                take_reference(device, TARE_FRAMES, streamed=True, anyway=anyway)
+            except SkinTouchedError as error:
+                self._tare_again_s = time.monotonic() + AGAIN_S
+                raise SkinTouchedError(
+                    f"{error}; or press Tare again within {AGAIN_S:g} s to take it all the same"
+                ) from None
             return f"reference taken from {TARE_FRAMES} frames"
+
+        return self._changed(session, action)
+
+    def undo_tare(self) -> Future[str]:
+        """Bring back the reference before the last tare."""
+        session = self._board("tare")
+        if session.recorder is not None:
+            raise UsageError("undo: a recording holds its reference; stop the recording first")
+
+        def action(device: Device) -> str:
+            device.undo_tare()
+            if session.reference is not None:
+                session.reference.undo()
+            return "the reference before the last tare is back"
 
         return self._changed(session, action)
 

@@ -70,6 +70,7 @@ def setup_text(session: Session, may_command: bool) -> str:
         "speed": session.pacer.speed,
         "paused": session.pacer.paused,
         "has_truth": session.observer is not None,
+        "can_undo_tare": session.device.can_undo_tare,
         "reference_v": None if mean_v is None else mean_v.tolist(),
         "sign": None if solver is None else solver.sign,
         "iterations": None if solver is None else solver.iterations,

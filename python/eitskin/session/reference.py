@@ -19,6 +19,7 @@ class ReferenceMean:
 
     def __init__(self, link: Link, before: "ReferenceMean | None" = None) -> None:
         self.mean_v: FloatArray | None = None if before is None else before.mean_v
+        self._last_v: FloatArray | None = None
         self._untouched: list[FloatArray] = []
         link.begin_tap(lambda last: None, self._take)
 
@@ -34,6 +35,11 @@ class ReferenceMean:
             self._untouched.append(np.asarray(raw.voltage_v, dtype=np.float64))
             del self._untouched[:-MAX_FRAMES]
         elif self._untouched:
+            self._last_v = self.mean_v
             mean = np.mean(np.array(self._untouched), axis=0)
             self.mean_v = np.where(np.isfinite(mean), mean, 0.0)
             self._untouched = []
+
+    def undo(self) -> None:
+        """The reference before the last one is in use again."""
+        self.mean_v = self._last_v

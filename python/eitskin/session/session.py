@@ -36,7 +36,7 @@ from eitskin.session.observer import Observer
 from eitskin.session.reference import ReferenceMean
 from eitskin.session.replay import Replay
 from eitskin.session.requests import Requests
-from eitskin.session.set_up import begin_scene, set_up, take_reference
+from eitskin.session.set_up import begin_scene, set_up, take_reference, wait_untouched
 from eitskin.session.settings import KINDS, Say, SessionSettings
 from eitskin.session.summary import Summary
 from eitskin.session.zones import refuse_off_skin
@@ -209,9 +209,9 @@ class Session:
         self.pacer.wake()
         return answer
 
-    def tare(self, frames: int = TARE_FRAMES) -> Future[None]:
-        """Take the reference again, from frames of the untouched skin."""
-        return self.ask(lambda device: device.tare(frames))
+    def tare(self, frames: int = TARE_FRAMES, *, anyway: bool = False) -> Future[None]:
+        """Take the reference again, from frames of the untouched skin, as ``Device.tare``."""
+        return self.ask(lambda device: device.tare(frames, anyway=anyway))
 
     # ---- to be called in ``ask`` ----
 
@@ -468,7 +468,10 @@ class Session:
         frames = TARE_FRAMES if how.tare is None else how.tare
         if not simulated:
             self._say(f"leave the skin untouched: taking the reference from {frames} frames")
-        take_reference(self.device, frames, streamed=recorded or how.quiet_frames)
+        wait_untouched(
+            lambda: take_reference(self.device, frames, streamed=recorded or how.quiet_frames),
+            self._say,
+        )
         if not simulated:
             self._say("touch it")
 

@@ -1,5 +1,7 @@
 """The steps before a board's frames: scan, solver, reference, and the beginning of a scene."""
 
+import time
+from collections.abc import Callable
 from contextlib import suppress
 
 from eitskin.core.results import Options
@@ -10,7 +12,9 @@ from eitskin.device.streaming import LEAVE_S
 from eitskin.device.transport import LinkEvent
 from eitskin.device.wire.link_table import Stream, StreamCommand
 from eitskin.device.wire.packets import Fault
-from eitskin.errors import DeviceError, EitskinError
+from eitskin.errors import DeviceError, EitskinError, SkinTouchedError
+
+UNTOUCHED_S = 20.0  # that a tare waits for fingers to lift
 
 
 def set_up(
@@ -37,18 +41,45 @@ def set_up(
     return options
 
 
-def take_reference(device: Device, frames: int, *, streamed: bool = False) -> None:
-    """Tare; where ``streamed``, the untouched frames are sent as raw frames too, for recordings."""
+def wait_untouched(
+    take: Callable[[], None], say: Callable[[str], None], wait_s: float = UNTOUCHED_S
+) -> None:
+    """``take`` the reference; while something touches the skin, say so and try again.
+
+    Raises:
+        SkinTouchedError: something still does after ``wait_s``.
+    """
+    end_s, said = time.monotonic() + wait_s, ""
+    while True:
+        try:
+            return take()
+        except SkinTouchedError as error:
+            if time.monotonic() >= end_s:
+                raise SkinTouchedError(
+                    f"{error}; where nothing touches it, run  eitskin tare --anyway"
+                ) from None
+            if str(error) != said:
+                say(f"the reference waits: {error}")
+                said = str(error)
+
+
+def take_reference(
+    device: Device, frames: int, *, streamed: bool = False, anyway: bool = False
+) -> None:
+    """Tare; where ``streamed``, the untouched frames are sent as raw frames too, for recordings.
+    ``anyway`` and errors are those of ``Device.tare``."""
     if not streamed:
-        device.tare(frames)
+        device.tare(frames, anyway=anyway)
         return
+    if not anyway:
+        device.check_untouched()
 
     def stop() -> None:
         device.send_command(StreamCommand(0), 1.0)
 
     device.send_command(StreamCommand(int(Stream.RAW)), 1.0)
     try:
-        device.tare(frames)
+        device.tare(frames, anyway=True)
     except BaseException:
         with suppress(EitskinError):
             device.bounded(LEAVE_S, stop)

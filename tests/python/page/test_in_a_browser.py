@@ -191,6 +191,14 @@ def test_pause_step_play_and_speed(live, server):
 
 def test_tare_solver_and_mode(live, server):
     session = server.reader.live()
+    live.click("tare")
+    assert "touches the skin at" in live.answer()
+    live.click("tare")  # the touches are in the reference then
+    assert live.answer() == "reference taken from 16 frames"
+    until(lambda: not live.touches())
+    live.click("undo")
+    assert live.answer() == "the reference before the last tare is back"
+    until(lambda: live.touches() and live.get("undo", "hidden"))
     live.choose("sign", "decrease")
     assert live.answer() == "solver: sign decrease"
     until(lambda: not live.touches())  # they are increases
@@ -211,9 +219,6 @@ def test_tare_solver_and_mode(live, server):
     live.run("document.querySelector('#mode input[value=raw]').click()")
     assert live.answer() == "streaming touches, image, raw"
     until(lambda: "raw voltages" in live.get("volts", "ariaLabel"))
-    live.click("tare")  # the touches are in the reference then
-    assert live.answer() == "reference taken from 16 frames"
-    until(lambda: not live.touches())
     begin_again(server)
 
 

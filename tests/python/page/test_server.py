@@ -303,3 +303,30 @@ def test_the_command_says_where_and_ends_by_the_keyboard(scene, tmp_path):
     assert "Traceback" not in errors
     assert errors.splitlines()[-1] == "eitskin: stopped"
     assert len((tmp_path / "t.csv").read_text().splitlines()) > 1
+
+
+def test_a_tare_under_a_finger_is_refused_then_taken_and_undone(tmp_path):
+    """The second tare within seconds takes the reference all the same; the page offers undo."""
+    path = tmp_path / "long.toml"
+    path.write_text(
+        "[scene]\nframes = 4000\nquiet_frames = 16\nelements = 1500\nrate_hz = 48.0\n"
+        "[[touch]]\nx_mm = 20.0\ny_mm = 0.0\nradius_mm = 9.0\n"
+    )
+    with serving(f"sim:{path}?speed=1") as server, opened(server, TOKEN) as line:
+        assert not reported(line, "setup")["can_undo_tare"]
+
+        def ask(what: str) -> tuple[bool, str, bool]:
+            """Whether it was done, the answer's text, and whether a tare can be undone now."""
+            line.send(json.dumps({"type": "do", "do": what}))
+            can_undo = reported(line, "setup")["can_undo_tare"]
+            answer = reported(line, "answer")
+            return answer["ok"], answer["text"], can_undo
+
+        ok, text, can_undo = ask("tare")
+        assert not ok and not can_undo
+        assert re.search(r"touches the skin at \(\d+, -?\d+\) mm", text)
+        assert "press Tare again within 10 s" in text
+        assert ask("tare") == (True, "reference taken from 16 frames", True)
+        assert ask("undo-tare") == (True, "the reference before the last tare is back", False)
+        ok, text, _ = ask("undo-tare")
+        assert not ok and "does not keep" in text

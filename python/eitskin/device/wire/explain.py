@@ -28,6 +28,12 @@ def field_at(command: int, offset: int) -> str:
     return kind.LAYOUT.field_at(offset) or f"byte {offset}"
 
 
+def found_touched(reply: Reply) -> bool:
+    """Whether a tare was refused because something landed, moved or lifted meanwhile."""
+    touched = int(load_core("float32").lib.EITS_E_REFERENCE_TOUCHED)
+    return reply.status == ReplyStatus.CORE and reply.detail[0] == touched
+
+
 def reply_text(reply: Reply) -> str:
     """Why a command was refused, and what to do; for a reply that is not OK."""
     name, (first, second) = command_name(reply.command), reply.detail
@@ -44,7 +50,10 @@ def reply_text(reply: Reply) -> str:
         ),
         ReplyStatus.NO_MODEL: f"the board has no model; {UPLOAD}",
         ReplyStatus.NOT_TARED: (
-            "the board has no reference frame; leave the skin untouched and run  eitskin tare"
+            "the board does not keep the reference before the last tare; leave the skin untouched"
+            " and take it again"
+            if reply.command == PacketType.TARE
+            else "the board has no reference frame; leave the skin untouched and run  eitskin tare"
         ),
         ReplyStatus.BUSY: f"the board is busy with {command_name(first)}; wait for it",
         ReplyStatus.MODEL_SIZE: (
@@ -145,7 +154,8 @@ _FOUND = {
         "no such sheet gives such voltages; check order, signs and wiring (eitskin doctor)"
     ),
     FaultCode.STALE_REFERENCE: (
-        "the skin has changed since it was taken; leave it untouched and run  eitskin tare"
+        "the skin was touched while it was taken, or has changed since; leave it untouched and run"
+        "  eitskin tare"
     ),
     FaultCode.UNLIKE_MODEL: (
         "the reference is not this model's; check order, signs and skin (eitskin doctor), build the"

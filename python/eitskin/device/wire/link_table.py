@@ -77,7 +77,7 @@ class ReplyStatus(IntEnum):
     LENGTH = 2  # [0] bytes of payload that are expected
     RANGE = 3  # [0] offset in the payload of the field out of range; [1] the limit it broke
     NO_MODEL = 4  # no model is in use: send one first
-    NOT_TARED = 5  # there is no reference: send a TARE first
+    NOT_TARED = 5  # there is no reference: send a TARE first; of a TARE: none to bring back
     BUSY = 6  # [0] type of the command under way
     MODEL_SIZE = 7  # [0] most bytes that a bank, a packet or the memory holds
     MODEL_INVALID = 8  # [0] eits_status
@@ -419,7 +419,8 @@ class StreamCommand(Command, c="eits_command_stream", kind=PacketType.STREAM):
 class Tare(Command, c="eits_command_tare", kind=PacketType.TARE):
     """take the reference"""
 
-    frames: U32  # 1, or 4 to 1024
+    # 1, or 4 to 1024; 0: the reference before the last tare comes back, where it is kept
+    frames: U32
 
 
 @dataclass(frozen=True)

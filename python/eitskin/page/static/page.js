@@ -114,7 +114,8 @@ function takeSetup(setup) {
   const same = before && before.model_crc === setup.model_crc && before.url === setup.url && Boolean(before.skin) === Boolean(setup.skin);
   if (!same) skin.setSkin(setup.skin);
   const may = setup.may_command, board = may && !setup.replays;
-  for (const id of ["tare", "record", "preset", "sign", "iterations", "model"]) $(id).disabled = !board;
+  $("undo").hidden = !setup.can_undo_tare;
+  for (const id of ["tare", "undo", "record", "preset", "sign", "iterations", "model"]) $(id).disabled = !board;
   for (const box of $("mode").querySelectorAll("input")) {
     box.disabled = !board;
     box.checked = setup.mode.includes(box.value);
@@ -283,6 +284,7 @@ function playOrPause() {
 }
 
 $("tare").addEventListener("click", () => ask("tare"));
+$("undo").addEventListener("click", () => ask("undo-tare"));
 $("record").addEventListener("click", () => ask("record", $("record").getAttribute("aria-pressed") !== "true"));
 $("play").addEventListener("click", playOrPause);
 $("step").addEventListener("click", () => ask("step"));
@@ -310,7 +312,7 @@ addEventListener("resize", soon);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", soon);
 addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|BUTTON)$/.test(event.target.tagName)) return;
-  const button = { t: "tare", r: "record", " ": "play", ".": "step", b: "teach-back", s: "teach-skip", f: "teach-fit" }[event.key.toLowerCase()];
+  const button = { t: "tare", z: "undo", r: "record", " ": "play", ".": "step", b: "teach-back", s: "teach-skip", f: "teach-fit" }[event.key.toLowerCase()];
   if (!button || $(button).disabled || $(button).hidden) return;
   event.preventDefault();
   $(button).click();
