@@ -41,6 +41,11 @@ def add_parser(subparsers: Any) -> None:
         choices=("disc", "ellipse", "hertz", "gauss", "finger"),
         default="disc",
     )
+    option(
+        parser,
+        "--methods WORDS",
+        "only methods with one of these words in their names, such as eitskin,noser",
+    )
     option(parser, "--threads N", "of the C core's frames", default=1)
     option(parser, "--json", "print JSON, with the curves over the threshold")
     option(parser, "--csv FILE", "write the numbers of every scene", Output)
@@ -81,6 +86,7 @@ def run(options: argparse.Namespace) -> int:
         protocol,
         settings,
         families=partial(methods, threads=options.threads),
+        only=[word.strip() for word in (options.methods or "").split(",") if word.strip()],
         progress=named_bar,
     )
     if options.csv is not None:

@@ -15,6 +15,7 @@ matrix products, all of J's rows taken; what is made once for a skin is not coun
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -208,6 +209,11 @@ class PlainFista:
         iteration."""
         return (1 + 2 * self.iterations) * self.jacobian.size
 
+    @cached_property
+    def step(self) -> float:
+        """1 / L, with L the largest eigenvalue of J'J; found once, as a stored model has it."""
+        return 1.0 / float(np.linalg.norm(self.jacobian, 2)) ** 2
+
     def lambdas(self, dv: npt.ArrayLike) -> FloatArray:
         """The lambda of each frame: (k,), at least 0."""
         slope = difference_frames(dv, len(self.jacobian)) @ self.jacobian
@@ -222,7 +228,7 @@ class PlainFista:
             FrameError: as :func:`difference_frames`.
         """
         frames = difference_frames(dv, len(self.jacobian))
-        step = 1.0 / float(np.linalg.norm(self.jacobian, 2)) ** 2
+        step = self.step
         shrink = (step * self.lambdas(frames))[:, None]
         image = np.zeros((len(frames), self.jacobian.shape[1]))
         ahead, t = image, 1.0

@@ -7,10 +7,13 @@ from eitskin.arrays import FloatArray
 from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError, UsageError
 from eitskin.model.build import BuildSettings, make_model
+from eitskin.model.eitm import encode_model
 from eitskin.scoring.metrics import pixel_cover
 from eitskin.solve.batch import Batch
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.compare.families import Family, Setup
+
+SHOWN = {"image": "image", "solver": "solver's image", "discs": "touches as discs"}
 
 
 class CoreMethod:
@@ -18,20 +21,25 @@ class CoreMethod:
 
     Args:
         solver: with the model and the options to compare.
-        painted: judge the touches, painted as discs, instead of the image.
+        shows: what is judged: "image", the one that shows the frame, which is drawn of the touches
+            where they explain it; "solver", the solver's own; or "discs", touches as even discs.
         threads: how many frames at once; the results are the same.
     """
 
-    def __init__(self, solver: Reconstructor, painted: bool = False, threads: int = 1) -> None:
-        self._solver, self._painted = solver, painted
+    def __init__(self, solver: Reconstructor, shows: str = "image", threads: int = 1) -> None:
+        self._solver, self._shows = solver, shows
         self._batch = Batch(
             solver.model, threads=threads, engine=solver.engine, options=solver.options
         )
         self._reference: FloatArray | None = None
         self._solved: tuple[FloatArray, list[Reconstruction]] | None = None
-        self.name = (
-            f"eitskin {solver.options.iterations}, {'touches as discs' if painted else 'image'}"
-        )
+        self.name = f"eitskin {solver.options.iterations}, {SHOWN[shows]}"
+
+    @property
+    def kept_bytes(self) -> int:
+        """The model's bytes and the workspace of one core."""
+        engine = self._solver.c_engine
+        return len(encode_model(self._solver.model)) + (engine.workspace_bytes if engine else 0)
 
     def learn(self, untouched_v: FloatArray) -> None:
         """Reference and noise from untouched frames (q, m) in V."""
@@ -39,15 +47,17 @@ class CoreMethod:
         self._reference, self._solved = np.asarray(untouched_v.mean(axis=0)), None
 
     def reconstruct(self, dv: FloatArray) -> FloatArray:
-        """Images (k, n) of difference frames (k, m) in V: in S/m, or where painted the part of each
+        """Images (k, n) of difference frames (k, m) in V: in S/m, or for discs the part of each
         pixel in a disc.
 
         Raises:
             UsageError: nothing was learned yet.
             FrameError: a frame cannot be used.
         """
-        if not self._painted:
-            return np.array([result.solver_image for result in self._solve(dv)], dtype=np.float64)
+        if self._shows != "discs":
+            solved = self._solve(dv)
+            images = [one.image if self._shows == "image" else one.solver_image for one in solved]
+            return np.array(images, dtype=np.float64)
         radii = [[touch.radius_mm for touch in result.touches] for result in self._solve(dv)]
         grid = self._solver.model.grid
         return np.array(
@@ -86,8 +96,8 @@ class CoreMethod:
 
 
 def core_methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
-    """The image after 30 and after 60 iterations, and the touches after 60; all else are the
-    model's defaults.
+    """The solver's image after 30 and after 60 iterations, the image that shows the frame, and the
+    touches; all else are the model's defaults.
 
     The model is made from the same Jacobian as every other method. Nothing is trained but
     thresholds.
@@ -97,12 +107,12 @@ def core_methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     """
     model = make_model(setup.skin, setup.protocol, setup.linearisation, BuildSettings())
 
-    def family(iterations: int, painted: bool) -> Family:
+    def family(iterations: int, shows: str) -> Family:
         def make(_: float) -> CoreMethod:
             solver = Reconstructor(model)
             solver.set_options(iterations=iterations)
-            return CoreMethod(solver, painted, threads)
+            return CoreMethod(solver, shows, threads)
 
         return Family("", (0.0,), make)
 
-    return family(30, False), family(60, False), family(60, True)
+    return family(30, "solver"), family(60, "solver"), family(60, "image"), family(60, "discs")

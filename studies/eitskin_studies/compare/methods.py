@@ -1,6 +1,7 @@
 """The methods that are compared: baselines, the C core, and those of other packages."""
 
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 
 from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
@@ -9,22 +10,26 @@ from eitskin_studies.compare import baselines
 from eitskin_studies.compare.core_method import core_methods
 from eitskin_studies.compare.families import Family, Setup
 from eitskin_studies.compare.greit import train_greit
+from eitskin_studies.compare.pyeit_method import pyeit_method
 
 ENTRY_POINT_GROUP = "eitskin.methods"
 STRENGTHS = (1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 1e-3, 1e-2)
 STEPS = (5, 10, 20, 30, 50, 80, 120, 200)
 RATIOS = (1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
+CONVERGED_RATIOS = (1e-3, 3e-3, 1e-2)  # 3,000 iterations take ten times as long as 300
 
 
 def methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     """All that ``eitskin compare`` compares, in the order of its table; the C core's frames over
-    ``threads``.
+    ``threads``. pyEIT is among them where it is installed.
 
     Raises:
         UsageError: the C core is not built, or a method of another package cannot be made.
     """
     classic = baseline_methods(setup.jacobian, setup.grid)
-    return (*classic, *own_methods(setup), *core_methods(setup, threads))
+    converged = plain_fista(setup.jacobian, 3000, signed=False, ratios=CONVERGED_RATIOS)
+    theirs = (pyeit_method(setup),) if find_spec("pyeit") else ()
+    return (*classic, converged, *theirs, *own_methods(setup), *core_methods(setup, threads))
 
 
 def own_methods(setup: Setup) -> tuple[Family, ...]:
@@ -50,14 +55,6 @@ def baseline_methods(jacobian: FloatArray, grid: Grid) -> tuple[Family, ...]:
     """The methods of ``baselines`` and ``greit`` with the parameter values that are tried for
     each."""
     greit = train_greit(jacobian, grid)
-
-    def fista(iterations: int, signed: bool) -> Family:
-        return Family(
-            "lambda / lambda_max",
-            RATIOS,
-            lambda ratio: baselines.PlainFista(jacobian, iterations, ratio, signed),
-        )
-
     return (
         Family("norm", (1.0, 2.0), lambda norm: baselines.back_projection(jacobian, norm)),
         Family("strength", STRENGTHS, lambda strength: baselines.gauss_newton(jacobian, strength)),
@@ -68,8 +65,19 @@ def baseline_methods(jacobian: FloatArray, grid: Grid) -> tuple[Family, ...]:
             tuple(map(float, STEPS)),
             lambda k: baselines.ConjugateGradient(jacobian, int(k)),
         ),
-        fista(30, True),
-        fista(300, True),
-        fista(30, False),
-        fista(300, False),
+        plain_fista(jacobian, 30, True),
+        plain_fista(jacobian, 300, True),
+        plain_fista(jacobian, 30, False),
+        plain_fista(jacobian, 300, False),
+    )
+
+
+def plain_fista(
+    jacobian: FloatArray, iterations: int, signed: bool, ratios: tuple[float, ...] = RATIOS
+) -> Family:
+    """The family of ``baselines.PlainFista`` over ``ratios``."""
+    return Family(
+        "lambda / lambda_max",
+        ratios,
+        lambda ratio: baselines.PlainFista(jacobian, iterations, ratio, signed),
     )

@@ -16,7 +16,7 @@ from eitskin_studies.compare.families import Family, Setup
 
 ELEMENTS = 3000
 NAME = "pyEIT Gauss-Newton"
-LAMBDAS = tuple(10.0**power for power in range(-9, 1))  # of JAC.setup, in units of its own J
+LAMBDAS = tuple(10.0**power for power in range(-9, 5))  # of JAC.setup, in units of its own J
 
 
 def pyeit_method(setup: Setup) -> Family:

@@ -25,7 +25,9 @@ from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.solve.image_touches import touches_in_image
+from eitskin_studies.compare.cost import Cost, cost
 from eitskin_studies.compare.families import Family, FindsTouches, Learns, Method, Setup, setup_for
+from eitskin_studies.compare.figures import Figures, figures, small_targets
 from eitskin_studies.compare.methods import methods
 from eitskin_studies.harness.summary import Summary, summarise
 from eitskin_studies.harness.thresholds import (
@@ -90,6 +92,8 @@ class CompareResult:
         matchings: of each test scene.
         images: (k, n) of the test scenes.
         found_mm: positions (t, 2) found in each test scene.
+        figures: of GREIT, of small targets without noise.
+        cost: on this computer; the only numbers that differ from run to run.
     """
 
     name: str
@@ -103,6 +107,8 @@ class CompareResult:
     matchings: tuple[Matching, ...]
     images: FloatArray
     found_mm: tuple[FloatArray, ...]
+    figures: Figures
+    cost: Cost
 
     @property
     def miou_summary(self) -> Summary:
@@ -169,6 +175,7 @@ def compare(
     settings: CompareSettings | None = None,
     *,
     families: Callable[[Setup], Sequence[Family]] = methods,
+    only: Sequence[str] = (),
     progress: Progress = silent,
 ) -> Comparison:
     """Run the comparison; the same arguments give the same numbers.
@@ -177,14 +184,16 @@ def compare(
         skin, protocol: what is simulated and reconstructed.
         settings: None takes the defaults.
         families: what is compared, built from the setup.
+        only: names of methods, or words in them; all methods without it.
         progress: wraps sequences of work, with what it is.
 
     Raises:
         UsageError, GeometryError, ProtocolError, MissingExtraError: from drawing, meshing and
-            simulating.
+            simulating, or no method has such a name.
     """
     how = CompareSettings() if settings is None else settings
     setup = setup_for(skin, protocol, elements=how.elements)
+    chosen = named(families(setup), only)
     image_scorer = metrics.judge_for(skin.outline, setup.grid, how.raster_mm, how.lookup)
     mesh = mesh_for_elements(skin, how.simulated_elements)
 
@@ -204,9 +213,9 @@ def compare(
         )
 
     train, test = session("train", how.train_scenes), session("test", how.scenes)
-    chosen = families(setup)
+    targets = small_targets(skin, protocol, mesh)
     results = tuple(
-        _run(family, setup, image_scorer, train, test, how.gate_mm)
+        _run(family, setup, image_scorer, train, test, targets, how.gate_mm)
         for family in progress(chosen, "reconstructing")
     )
     perfect = np.array(
@@ -228,6 +237,23 @@ def compare(
     )
 
 
+def named(families: Sequence[Family], only: Sequence[str]) -> Sequence[Family]:
+    """Return the families whose method's name has one of the words ``only`` in it, in any case.
+
+    Raises:
+        UsageError: a word is in no name.
+    """
+    names = [family.make(family.values[0]).name for family in families]
+    for word in only:
+        if not any(word.lower() in name.lower() for name in names):
+            raise UsageError(f"--methods {word}: no method's name has that; {', '.join(names)}")
+    return [
+        family
+        for family, name in zip(families, names, strict=True)
+        if not only or any(word.lower() in name.lower() for word in only)
+    ]
+
+
 def truth_masks(touches: TouchSet, points_mm: FloatArray) -> BoolArray:
     """The touches of each scene on the raster's cells (p, 2): (k, p)."""
     return np.array([scene.mask(points_mm) for scene in touches.scenes])
@@ -239,13 +265,14 @@ def _run(
     image_scorer: metrics.ImageScorer,
     train: _Session,
     test: _Session,
+    targets: Simulated,
     gate_mm: float,
 ) -> CompareResult:
     """Train a family, then test what came of it."""
     best: tuple[float, float, Method, FloatArray, FloatArray] | None = None
     for value in family.values:
         method = family.make(value)
-        images = _images(method, train, setup.grid.n_pixels)
+        images = _images(method, train.simulated, train.dv, setup.grid.n_pixels)
         curves = miou_curves(image_scorer, images, train.truths)
         score = float(curves.mean(axis=0).max())
         if best is None or score > best[0] + 1e-12:
@@ -261,7 +288,7 @@ def _run(
         touch_threshold = best_touch_threshold(
             train_images, train.centres_mm, index, centres, TOUCH_THRESHOLDS, gate_mm=gate_mm
         )
-    images = _images(method, test, setup.grid.n_pixels)
+    images = _images(method, test.simulated, test.dv, setup.grid.n_pixels)
     if isinstance(method, FindsTouches):
         found = tuple(
             np.asarray(xy, dtype=np.float64).reshape(-1, 2) for xy in method.touches(test.dv)
@@ -270,6 +297,8 @@ def _run(
         assert touch_threshold is not None
         found = tuple(touches_in_image(image, index, centres, touch_threshold) for image in images)
     curves = miou_curves(image_scorer, images, test.truths)
+    spent = cost(method, test.dv)
+    small = _images(method, targets, targets.differences_v(), setup.grid.n_pixels)
     return CompareResult(
         name=method.name,
         parameter=family.parameter,
@@ -282,16 +311,18 @@ def _run(
         matchings=tuple(match_all(test.centres_mm, found, gate_mm)),
         images=images,
         found_mm=found,
+        figures=figures(setup.grid, small, targets),
+        cost=spent,
     )
 
 
-def _images(method: Method, session: _Session, n_pixels: int) -> FloatArray:
+def _images(method: Method, session: Simulated, dv: FloatArray, n_pixels: int) -> FloatArray:
     if isinstance(method, Learns):
-        method.learn(session.simulated.untouched_v)
-    images = np.asarray(method.reconstruct(session.dv), dtype=np.float64)
-    if images.shape != (len(session.dv), n_pixels) or not np.isfinite(images).all():
+        method.learn(session.untouched_v)
+    images = np.asarray(method.reconstruct(dv), dtype=np.float64)
+    if images.shape != (len(dv), n_pixels) or not np.isfinite(images).all():
         raise UsageError(
-            f"{method.name}: made images {images.shape} of {len(session.dv)} frames; they must be"
+            f"{method.name}: made images {images.shape} of {len(dv)} frames; they must be"
             f" finite, one value for each of {n_pixels} pixels"
         )
     return images

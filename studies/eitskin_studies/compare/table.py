@@ -4,9 +4,11 @@ depend on."""
 import csv
 import io
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from eitskin_studies.compare.figures import Figures
 from eitskin_studies.compare.run import CompareResult, Comparison
 from eitskin_studies.harness.summary import Summary
 from eitskin_studies.harness.thresholds import THRESHOLDS
@@ -20,8 +22,18 @@ COLUMNS = (
     "worst tenth",
     "median position error",
     "exact count",
+    "ms",
+    "kB",
     "threshold t",
     "trained",
+)
+FIGURE_COLUMNS = (
+    "method",
+    "amplitude response, sd",
+    "position error",
+    "resolution",
+    "shape deformation",
+    "ringing",
 )
 CSV_COLUMNS = (
     *("method", "scene", "touches", "miou"),
@@ -110,6 +122,10 @@ def header(comparison: Comparison) -> list[tuple[str, str]]:
             + f"; exact count: each touch within {how.gate_mm:g} mm and nothing else",
         ),
         (
+            "ms, kB",
+            "median time of one frame through Python on this computer; what is kept between frames",
+        ),
+        (
             "ceiling",
             (
                 f"a perfect image on this grid: {comparison.ceiling:.3f} (t ="
@@ -120,18 +136,38 @@ def header(comparison: Comparison) -> list[tuple[str, str]]:
 
 
 def to_text(comparison: Comparison) -> str:
-    """Header and table for a terminal."""
-    rows = [COLUMNS, *(_cells(result) for result in comparison.results)]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(COLUMNS))]
+    """Header and tables for a terminal."""
     lines = [f"{subject + ':':<17}{text}" for subject, text in header(comparison)]
-    lines.append("")
+    lines += ["", *_table(COLUMNS, [_cells(result) for result in comparison.results])]
+    figures = [_figure_cells(result) for result in comparison.results]
+    lines += ["", "GREIT's figures of small targets, without noise:"]
+    lines += _table(FIGURE_COLUMNS, figures)
+    return "\n".join(lines)
+
+
+def _table(columns: Sequence[str], cells: Sequence[Sequence[str]]) -> list[str]:
+    """Return the lines of a table with its head."""
+    rows, lines = [columns, *cells], []
+    widths = [max(len(row[k]) for row in rows) for k in range(len(columns))]
     for number, row in enumerate(rows):
         lines.append(
             " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
         )
         if number == 0:
             lines.append("-|-".join("-" * width for width in widths))
-    return "\n".join(lines)
+    return lines
+
+
+def _figure_cells(result: CompareResult) -> tuple[str, ...]:
+    shown = result.figures
+    return (
+        result.name,
+        f"{100 * shown.amplitude_spread:.0f} %",
+        f"{shown.position_error_mm:.1f} mm",
+        f"{shown.resolution:.3f}",
+        f"{shown.shape_deformation:.3f}",
+        f"{shown.ringing:.3f}",
+    )
 
 
 def _cells(result: CompareResult) -> tuple[str, ...]:
@@ -143,6 +179,8 @@ def _cells(result: CompareResult) -> tuple[str, ...]:
         f"{miou.worst_tenth:.3f}",
         f"{position.median:.1f} mm" if position.count else "no hits",
         f"{100 * result.exact_count:.0f} %",
+        f"{result.cost.frame_ms:.2f}",
+        f"{result.cost.kept_kb:.0f}",
         f"{result.threshold:.2f}",
         f"{result.parameter} = {result.value:g}" if result.parameter else "",
     )
@@ -180,17 +218,20 @@ def _result_json(result: CompareResult) -> dict[str, Any]:
         "threshold": result.threshold,
         "touch_threshold": result.touch_threshold,
         "train_miou": result.train_miou,
-        "miou": _summary_json(result.miou_summary),
-        "position_error_mm": _summary_json(result.position_summary),
+        "miou": _numbers(result.miou_summary),
+        "position_error_mm": _numbers(result.position_summary),
         "exact_count": result.exact_count,
         "hit_share": result.hit_share,
         "false_per_scene": result.false_per_scene,
+        "greit_figures": _numbers(result.figures),
+        "frame_ms": result.cost.frame_ms,
+        "kept_kb": result.cost.kept_kb,
         "miou_over_threshold": [float(value) for value in result.curve],
     }
 
 
-def _summary_json(summary: Summary) -> dict[str, float | int | None]:
-    return {key: None if math.isnan(value) else value for key, value in asdict(summary).items()}
+def _numbers(of: Summary | Figures) -> dict[str, float | int | None]:
+    return {key: None if math.isnan(value) else value for key, value in asdict(of).items()}
 
 
 def to_csv(comparison: Comparison) -> str:
