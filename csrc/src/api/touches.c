@@ -27,6 +27,14 @@ static int may_have_touches(const eits_context *ctx)
            stop != EITS_STOP_DIVERGED;
 }
 
+/* What the discs leave unexplained, and of that what is no noise. */
+static void note_unexplained(eits_context *ctx, eits_fit *f)
+{
+    const eits_real left = f->total > 0 ? eits_fit_left(ctx, f) : 0;
+    ctx->info.unexplained = f->total > 0 ? left / f->total : 0;
+    f->beyond_noise = left > f->noise ? (left - f->noise) / f->total : 0;
+}
+
 /* Fit discs, and all of them jointly; discs that this does not make clear are tested before.
  * Whether they are crowded is checked by discs, on which its odds were counted. `found` is
  * overwritten. */
@@ -35,7 +43,7 @@ static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fi
 {
     eits_joint j;
     eits_fit_touches(ctx, scratch, f);
-    ctx->info.unexplained = f->total > 0 ? eits_fit_left(ctx, f) / f->total : 0;
+    note_unexplained(ctx, f);
     ctx->evidence.spent = 0; /* where no test is needed */
     const int clear = eits_fit_clearly(ctx, f, &j);
     if (!clear) {
@@ -43,7 +51,7 @@ static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fi
         eits_rate_touches(ctx, f);
         eits_fit_centre(ctx, scratch, f);
         eits_place_touches(ctx, scratch, f);
-        ctx->info.unexplained = f->total > 0 ? eits_fit_left(ctx, f) / f->total : 0;
+        note_unexplained(ctx, f);
     }
     eits_check_crowd(ctx, found, eits_report_touches(ctx, f, found));
     if (!clear)
@@ -52,16 +60,15 @@ static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fi
 
 /* Which image shows the frame: the touches' if they explain it and all of them are reported. Where
  * tracking still hides a touch that was found, the touches' image would lack it. */
-static eits_shown shown(const eits_context *ctx, uint32_t found, const eits_touch *reported,
-                        uint32_t count)
+static eits_shown shown(const eits_context *ctx, const eits_fit *f, uint32_t found,
+                        const eits_touch *reported, uint32_t count)
 {
     const eits_real most =
         ctx->model->uncertainty.errors != NULL ? EITS_SHOWN_UNEXPLAINED : EITS_SHOWN_UNTESTED;
     uint32_t drawn = 0;
     for (uint32_t k = 0; k < count; ++k)
         drawn += reported[k].explained > 0;
-    return drawn > 0 && drawn == found && ctx->info.unexplained < most ? EITS_SHOWN_TOUCHES
-                                                                       : EITS_SHOWN_SOLVER;
+    return drawn > 0 && drawn == found && f->beyond_noise < most ? EITS_SHOWN_TOUCHES : EITS_SHOWN_SOLVER;
 }
 
 eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t room,
@@ -99,7 +106,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
                                             their number is the same */
         eits_reference_tracking_break(ctx);
     ctx->info.touches = reported;
-    ctx->info.shown = shown(ctx, finite, found, reported);
+    ctx->info.shown = shown(ctx, &f, finite, found, reported);
     for (uint32_t k = 0; k < reported; ++k) {
         eits_bring_onto_skin(ctx, &found[k].x_mm, &found[k].y_mm);
         found[k].force_n =

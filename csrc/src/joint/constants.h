@@ -11,25 +11,38 @@
  * radius 6 to 12 mm and contrast 3 to 10 have. Check: scripts/test
  * tests/python/acceptance/test_joint_fit.py */
 
-/* expected |q| of a touch, q = 2 (c - 1) / (c + 1) of its contrast c. as the touches of a skin
+/* expected q = 2 (c - 1) / (c + 1) of a touch of contrast c = 3 to 10. as the touches of a skin
  * are */
-#define EITS_JOINT_AMPLITUDE R(1.35)
+#define EITS_JOINT_STRONG R(1.33)
 
-/* its deviation. larger: radius and strength mix; smaller: light touches err */
-#define EITS_JOINT_AMPLITUDE_SPREAD R(0.17)
+/* deviation of its logarithm. larger: radius and strength mix; smaller: other touches err */
+#define EITS_JOINT_STRONG_SPREAD R(0.13)
 
-/* T: how soon the prior of the amplitude stops to grow. larger: light touches get a radius that is
- * too small; smaller: radius and strength mix */
-#define EITS_JOINT_AMPLITUDE_TAIL R(0.7)
+/* expected |q| of a touch of contrast .1 to .5. as JOINT_STRONG */
+#define EITS_JOINT_INSULATING R(1.04)
 
-/* |q| from which a light touch begins: a contrast of 1.5. anything else needs more steps */
-#define EITS_JOINT_LIGHT R(0.4)
+/* deviation of its logarithm. as JOINT_STRONG_SPREAD */
+#define EITS_JOINT_INSULATING_SPREAD R(0.27)
+
+/* expected |q| of a light touch, of contrast 1.15 to 2. as JOINT_STRONG */
+#define EITS_JOINT_LIGHT R(0.39)
+
+/* deviation of its logarithm. as JOINT_STRONG_SPREAD */
+#define EITS_JOINT_LIGHT_SPREAD R(0.42)
+
+/* by how much F is higher for a light touch. larger: light touches are taken for small ones;
+ * smaller: small ones for light ones */
+#define EITS_JOINT_LIGHT_COST R(1.0)
+
+/* a touch is tried as the other kind, strong or light, where F would rise by less, as linearised.
+ * larger: costs; smaller: light touches keep a radius that is too small */
+#define EITS_JOINT_OTHER_RISE R(2.0)
 
 /* expected radius [of touch_seed_radius_mm]. as the touches of a skin are */
 #define EITS_JOINT_RADIUS R(0.9)
 
 /* deviation of its logarithm. as JOINT_AMPLITUDE_SPREAD */
-#define EITS_JOINT_RADIUS_SPREAD R(0.35)
+#define EITS_JOINT_RADIUS_SPREAD R(0.3)
 
 /* deviation of e1 and of e2. larger: discs become ellipses; smaller: fingers remain discs */
 #define EITS_JOINT_SHAPE_SPREAD R(0.15)
@@ -87,6 +100,13 @@
 /* by how much F falls at least where one becomes two. larger: pairs count as one; smaller: long
  * fingers become two */
 #define EITS_JOINT_SPLIT_FALL R(20.0)
+
+/* a light touch that is larger by more is tried as two strong ones though the data fit [log of the
+ * expected radius]. larger: pairs count as one light touch; smaller: costs */
+#define EITS_JOINT_LIGHT_LARGE R(0.33)
+
+/* by how much F falls at least where such a touch becomes two. as JOINT_SPLIT_FALL */
+#define EITS_JOINT_SPLIT_LARGE R(8.0)
 
 /* least distance of the two [of the sum of radii]. as JOINT_SPLIT_FALL */
 #define EITS_JOINT_SPLIT_APART R(0.9)
@@ -155,8 +175,8 @@
 /* greatest change of log radius in one step. as JOINT_MAX_MOVE */
 #define EITS_JOINT_MAX_GROWTH R(0.3)
 
-/* greatest change of the amplitude in one step. as JOINT_MAX_MOVE */
-#define EITS_JOINT_MAX_GAIN R(0.4)
+/* greatest change of log |amplitude| in one step. as JOINT_MAX_MOVE */
+#define EITS_JOINT_MAX_GAIN R(0.3)
 
 /* greatest change of e1 and e2 in one step. as JOINT_MAX_MOVE */
 #define EITS_JOINT_MAX_SHAPE R(0.25)

@@ -12,7 +12,6 @@
 #include "joint/joint.h"
 
 #include "base/cholesky.h"
-#include "base/log.h"
 #include "base/vec.h"
 #include "joint/constants.h"
 #include "kernels/kernels.h"
@@ -29,63 +28,6 @@ eits_real eits_joint_freedom(const eits_context *ctx, const eits_joint *j)
 eits_real eits_joint_excess(const eits_context *ctx, const eits_joint *j)
 {
     return eits_larger(j->misfit / eits_joint_freedom(ctx, j), 1);
-}
-
-/* ---- priors ---- */
-
-/* How far parameter p of a shape is from where its prior would have it. A radius is expected where
- * a fit's seed has it, and an amplitude where touches of contrast 3 to 10 have theirs, of either
- * sign; places have no prior. */
-static eits_real offset(const eits_context *ctx, const eits_shape *s, uint32_t p)
-{
-    const eits_real expected =
-        EITS_JOINT_RADIUS * ctx->options.touch_seed_radius_mm / (eits_real)ctx->model->pixel_mm;
-    switch (p) {
-    case 2:
-        /* of numbers that are not above 0, or not finite, there is no logarithm */
-        return eits_log(eits_clamp(s->radius / expected, R(1e-6), R(1e6)));
-    case 3:
-        return s->amplitude - (s->amplitude < 0 ? -EITS_JOINT_AMPLITUDE : EITS_JOINT_AMPLITUDE);
-    case 4:
-        return s->e1;
-    case 5:
-        return s->e2;
-    default:
-        return 0;
-    }
-}
-
-static eits_real deviation(uint32_t p)
-{
-    return p == 2   ? EITS_JOINT_RADIUS_SPREAD
-           : p == 3 ? EITS_JOINT_AMPLITUDE_SPREAD
-                    : EITS_JOINT_SHAPE_SPREAD;
-}
-
-/* A light touch has an amplitude far from the expected one, so its prior has a heavy tail: beside
- * (off / deviation)^2 = t, it costs T log(1 + t / T), about which the normal equations have the
- * weight 1 / (1 + t / T). */
-static eits_real tail(const eits_context *ctx, const eits_shape *s)
-{
-    const eits_real off = offset(ctx, s, 3) / EITS_JOINT_AMPLITUDE_SPREAD;
-    return eits_fma(off, off / EITS_JOINT_AMPLITUDE_TAIL, 1);
-}
-
-static eits_real precision(const eits_context *ctx, const eits_shape *s, uint32_t p)
-{
-    if (p < 2)
-        return 0;
-    return 1 / (deviation(p) * deviation(p) * (p == 3 ? tail(ctx, s) : 1));
-}
-
-eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_t parameters)
-{
-    eits_real sum = EITS_JOINT_AMPLITUDE_TAIL * eits_log(tail(ctx, s));
-    for (uint32_t p = 2; p < parameters; ++p) {
-        const eits_real off = p == 3 ? 0 : offset(ctx, s, p) / deviation(p);
-        sum = eits_fma(off, off, sum);
-    }
-    return sum;
 }
 
 static eits_real prior_of(const eits_context *ctx, const eits_joint *j)
@@ -155,6 +97,8 @@ static uint64_t add_block(eits_context *ctx, const eits_joint *j, uint32_t first
             out.slope[p] = m->column + (size_t)BLOCK * (free * j->parameters + p);
         free += (uint32_t)varies;
         macs += eits_pole_rows(ctx, k, &j->shape[k], poles_of(j), first, count, &out);
+        for (uint32_t i = 0; varies && i < count; ++i) /* of log |q| */
+            out.slope[3][i] *= j->shape[k].amplitude;
         for (uint32_t i = 0; i < count; ++i)
             left[i] -= value[i];
     }
@@ -175,11 +119,11 @@ static void finish_normal(eits_context *ctx, const eits_joint *j, const sums *s)
     for (uint32_t a = 0; a < j->free_count * j->parameters; ++a) {
         const uint32_t p = a % j->parameters;
         const eits_shape *shape = &j->shape[j->free[a / j->parameters]];
-        const eits_real prior = precision(ctx, shape, p);
+        const eits_real prior = eits_joint_precision(ctx, shape, p);
         eits_real *row = eits_lower_row(m->normal, a), *along = along_of(ctx, a);
         eits_joint_finish_along(ctx, along);
         m->gradient[a] -= product(along, s->along, nuisances);
-        m->gradient[a] = eits_fma(-prior, offset(ctx, shape, p), m->gradient[a]);
+        m->gradient[a] = eits_fma(-prior, eits_joint_offset(ctx, shape, p), m->gradient[a]);
         for (uint32_t b = 0; b <= a; ++b)
             row[b] -= product(along, along_of(ctx, b), nuisances);
         row[a] += prior;
@@ -232,6 +176,12 @@ static void solve(eits_context *ctx, uint32_t n, eits_real *v)
     eits_lower_solve_transposed(ctx->joint.factor, n, v);
 }
 
+/* e^step, up to the third order of a step that is small. */
+static eits_real growth(eits_real step)
+{
+    return eits_fma(step, eits_fma(R(0.5), step, 1), 1);
+}
+
 /* The shapes a step further. One that would leave the skin stays where it is; its other parameters
  * move. */
 static eits_joint moved(const eits_context *ctx, const eits_joint *from, const eits_real *step)
@@ -244,16 +194,15 @@ static eits_joint moved(const eits_context *ctx, const eits_joint *from, const e
     for (uint32_t a = 0; a < from->free_count * from->parameters; ++a)
         over = eits_larger(over, eits_fabs(step[a]) / most[a % from->parameters]);
     for (uint32_t i = 0; i < from->free_count; ++i) {
-        const eits_real *s = step + i * from->parameters, part = 1 / over, grow = part * s[2];
+        const eits_real *s = step + i * from->parameters, part = 1 / over;
         eits_shape *shape = &to.shape[from->free[i]];
         const eits_real x = eits_fma(part, s[0], shape->x), y = eits_fma(part, s[1], shape->y);
         if (eits_pole_on_skin(ctx, x, y)) {
             shape->x = x;
             shape->y = y;
         }
-        /* e^grow, up to the third order of a step that is small */
-        shape->radius *= eits_fma(grow, eits_fma(R(0.5), grow, 1), 1);
-        shape->amplitude = eits_clamp(eits_fma(part, s[3], shape->amplitude),
+        shape->radius *= growth(part * s[2]);
+        shape->amplitude = eits_clamp(growth(part * s[3]) * shape->amplitude,
                                       -EITS_JOINT_MAX_AMPLITUDE, EITS_JOINT_MAX_AMPLITUDE);
         if (from->parameters == EITS_JOINT_ELLIPSE) {
             shape->e1 = eits_clamp(eits_fma(part, s[4], shape->e1), -EITS_JOINT_MAX_ETA,
@@ -305,16 +254,31 @@ void eits_joint_free_all(eits_joint *j)
         j->free[k] = k;
 }
 
+/* What a change of the prior of log |amplitude| to that of the other kind brings: A + D e e' and
+ * the gradient g e instead of A and 0, so that the step is g A^-1 e / (1 + D e'A^-1 e). */
+static void know_other(const eits_shape *shape, const eits_real *block, eits_joint_known *known)
+{
+    const eits_real *amplitude = block + EITS_LOWER_SIZE(3); /* row 3 of A^-1 */
+    eits_joint_change c;
+    eits_joint_other_prior(shape, &c);
+    const eits_real far = c.gradient / eits_larger(eits_fma(c.precision, amplitude[3], 1),
+                                                   EITS_JOINT_MIN_PIVOT);
+    known->other_rise = c.cost - c.gradient * far * amplitude[3];
+    for (uint32_t i = 0; i < 3; ++i)
+        known->other_step[i] = far * amplitude[i];
+}
+
 /* By the block of A^-1 of one shape's parameters: its inverse is what all others leave of A. */
 static void know(const eits_context *ctx, const eits_joint *j, uint32_t k, eits_real *block,
                  eits_joint_known *known)
 {
     const uint32_t amplitude = 3, p = j->parameters;
-    const eits_real q = j->shape[k].amplitude;
     eits_real unit[EITS_JOINT_ELLIPSE] = {0};
     known->place[0] = eits_lower_row(block, 0)[0];
     known->place[1] = eits_lower_row(block, 1)[0];
     known->place[2] = eits_lower_row(block, 1)[1];
+    known->log_radius = eits_lower_row(block, 2)[2];
+    know_other(&j->shape[k], block, known);
     known->shape = 0;
     for (uint32_t i = EITS_JOINT_DISC; i < p; ++i) {
         const eits_real e = i == EITS_JOINT_DISC ? j->shape[k].e1 : j->shape[k].e2;
@@ -328,9 +292,8 @@ static void know(const eits_context *ctx, const eits_joint *j, uint32_t k, eits_
     unit[amplitude] = 1;
     eits_lower_solve(block, p, unit);
     eits_lower_solve_transposed(block, p, unit);
-    known->rise =
-        q * q *
-        (unit[amplitude] - precision(ctx, &j->shape[k], amplitude)); /* a prior is no evidence */
+    /* a prior is no evidence */
+    known->rise = unit[amplitude] - eits_joint_precision(ctx, &j->shape[k], amplitude);
 }
 
 uint64_t eits_joint_places(eits_context *ctx, const eits_joint *j, eits_joint_known *known)

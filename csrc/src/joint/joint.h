@@ -2,19 +2,19 @@
  * strengths, ellipses where the data support them, and how well each place is known.
  *
  *     F = sum over folds ((d - answers) / sigma)^2 - (what the gain's drift explains of it)
- *         + sum over touches of h((|q| - Q) / dQ) + (log(r / R) / dR)^2 + (e_1^2 + e_2^2) / dE^2
+ *         + sum over touches of h(log |q|) + (log(r / R) / dR)^2 + (e_1^2 + e_2^2) / dE^2
  *
  * is minimised by damped Gauss-Newton steps (fit.c). sigma^2 is the variance of a fold's noise and
- * of the multipole model's own error, which is a fraction of the data (metric.c). h grows like a
- * square at first and like a logarithm further out (fit.c). */
+ * of the multipole model's own error, which is a fraction of the data (metric.c). h is
+ * the less of what a light touch and of what any other costs (prior.c). */
 #ifndef EITSKIN_JOINT_H
 #define EITSKIN_JOINT_H
 
 #include "evidence/evidence.h"
 #include "multipole/multipole.h"
 
-/* Parameters of a touch in the order of eits_pole_out: x, y (pixels), log radius, amplitude and,
- * for an ellipse, e1 and e2. */
+/* Parameters of a touch in the order of eits_pole_out, but for the amplitude's logarithm: x, y
+ * (pixels), log radius, log |amplitude| and, for an ellipse, e1 and e2. */
 enum { EITS_JOINT_DISC = 4, EITS_JOINT_ELLIPSE = 6 };
 
 /* Touches under the fit. */
@@ -65,8 +65,37 @@ void eits_joint_descend(eits_context *ctx, eits_joint *j, uint32_t rounds, eits_
 /* All shapes are varied. */
 void eits_joint_free_all(eits_joint *j);
 
+/* prior.c */
+
 /* The prior's part of F for one shape. */
 eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_t parameters);
+
+/* How far parameter p of a shape is from where its prior has it, and 1 / variance of that prior; 0
+ * for places, which have none. */
+eits_real eits_joint_offset(const eits_context *ctx, const eits_shape *s, uint32_t p);
+eits_real eits_joint_precision(const eits_context *ctx, const eits_shape *s, uint32_t p);
+
+/* Whether the shape is likelier a light touch than a strong one; and the shape of its strength q r^2
+ * that is strong, or of the kind that it is not. */
+int eits_joint_is_light(const eits_shape *s);
+eits_shape eits_joint_as_strong(const eits_shape *s);
+eits_shape eits_joint_as_other(const eits_shape *s);
+
+/* Each shape becomes strong and small, or light and large, whichever is the likelier by the priors
+ * alone. */
+void eits_joint_guess_kinds(const eits_context *ctx, eits_joint *j);
+
+/* What becomes of F where the shape stands, and of its normal equations for log |amplitude|, if
+ * the shape counts as the other kind. */
+typedef struct eits_joint_change {
+    eits_real cost, precision, gradient;
+} eits_joint_change;
+
+void eits_joint_other_prior(const eits_shape *s, eits_joint_change *of);
+
+/* kinds.c: try each shape as the other kind where F may fall so; what lowers F stands. `settled` is
+ * what one descent takes. Adds to `macs`. The normal equations are those about *j then. */
+void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled, uint64_t *macs);
 
 /* settle.c: to the minimum of F: as discs, and as ellipses where discs leave more than noise and
  * ellipses lower F by enough. Returns the multiply-accumulates. */
@@ -87,6 +116,9 @@ typedef struct eits_joint_known {
     eits_real place[3]; /* covariance of x and y, pixels^2: xx, xy, yy */
     eits_real shape;    /* how far e1 and e2 are from 0, in variances; 0 for a disc */
     eits_real rise;     /* of F where its amplitude is 0 and the others make up for it */
+    eits_real log_radius; /* variance */
+    /* if it were of the other kind: the rise of F, and where x, y and log radius would be */
+    eits_real other_rise, other_step[3];
 } eits_joint_known;
 
 /* known[0 ... j->count - 1]; the normal equations are those about *j. */

@@ -6,34 +6,25 @@
 #include "joint/constants.h"
 #include "kernels/kernels.h"
 
-/* A shape of the disc's strength q r^2 with the amplitude `q`. */
-static eits_shape shape_of(const eits_context *ctx, const eits_disc *d, eits_real q)
+/* A disc as a touch that is not light. */
+static eits_shape shape_of(const eits_context *ctx, const eits_disc *d)
 {
     const eits_model *model = ctx->model;
-    const eits_real pixel = (eits_real)model->pixel_mm, r = d->radius_mm / pixel,
-                    strength = eits_fabs(d->change) / eits_pole_sheet(model) * r * r;
-    return (eits_shape){
-        .x = (d->x_mm - (eits_real)model->origin_x_mm) / pixel,
-        .y = (d->y_mm - (eits_real)model->origin_y_mm) / pixel,
-        .radius = eits_sqrt(strength / q),
-        .amplitude = d->change < 0 ? -q : q,
-    };
+    const eits_real pixel = (eits_real)model->pixel_mm;
+    const eits_shape found = {.x = (d->x_mm - (eits_real)model->origin_x_mm) / pixel,
+                              .y = (d->y_mm - (eits_real)model->origin_y_mm) / pixel,
+                              .radius = d->radius_mm / pixel,
+                              .amplitude = d->change / eits_pole_sheet(model)};
+    return eits_joint_as_strong(&found);
 }
 
-/* The fit's discs as shapes, each of the strength that was found: strong and small, or light and
- * large, whichever is the likelier by the priors. */
+/* The fit's discs as shapes, each of the strength that was found. */
 static eits_joint begin(const eits_context *ctx, const eits_fit *f, uint64_t spent)
 {
     eits_joint j = {.spent = spent, .count = f->count, .parameters = EITS_JOINT_DISC};
     for (uint32_t k = 0; k < f->count; ++k) {
-        const eits_disc *d = &f->disc[k];
-        const eits_shape strong = shape_of(ctx, d, EITS_JOINT_AMPLITUDE),
-                         light = shape_of(ctx, d, EITS_JOINT_LIGHT);
         j.from[k] = k;
-        j.shape[k] = eits_joint_prior(ctx, &light, EITS_JOINT_DISC) <
-                             eits_joint_prior(ctx, &strong, EITS_JOINT_DISC)
-                         ? light
-                         : strong;
+        j.shape[k] = shape_of(ctx, &f->disc[k]);
     }
     return j;
 }
@@ -70,6 +61,20 @@ static void inherit(eits_fit *f, uint32_t of, uint32_t k)
     f->confidence[k] = f->confidence[of];
 }
 
+/* What the shapes leave of the data beyond noise. */
+static eits_real left_beyond_noise(const eits_context *ctx, const eits_joint *j)
+{
+    return eits_larger(j->left - eits_joint_freedom(ctx, j), 0);
+}
+
+/* p (1 - p), where the other kind has the probability p = 1 / (1 + e^(2 x)), x = rise / 4: that is
+ * 1 / (2 cosh x)^2, with the series of cosh^2 up to x^4. */
+static eits_real doubt(eits_real rise)
+{
+    const eits_real x2 = rise * rise / 16;
+    return 1 / (4 * eits_fma(x2, eits_fma(x2, R(1) / 3, 1), 1));
+}
+
 static void report(eits_context *ctx, const eits_joint *j, const eits_joint_known *known,
                    eits_fit *f)
 {
@@ -79,6 +84,7 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
                     excess = eits_joint_excess(ctx, j), unit = pixel * pixel * excess;
     const eits_real whole = eits_joint_data(ctx);
     ctx->info.unexplained = whole > 0 && j->left > 0 ? j->left / whole : 0;
+    f->beyond_noise = whole > 0 ? left_beyond_noise(ctx, j) / whole : 0;
     f->count = j->count;
     f->joint = 1;
     for (uint32_t k = 0; k < j->count; ++k) {
@@ -97,9 +103,12 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
         f->ellipse_mm[k][0] = d->x_mm;
         f->ellipse_mm[k][1] = d->y_mm;
         f->ellipse_mm[k][2] = d->radius_mm;
-        f->place_mm2[k][0] = eits_fma(unit, place[0], least);
-        f->place_mm2[k][1] = unit * place[1];
-        f->place_mm2[k][2] = eits_fma(unit, place[2], least);
+        /* between the kinds, strong and light, places vary too */
+        const eits_real *other = known[k].other_step,
+                        either = pixel * pixel * doubt(known[k].other_rise / excess);
+        f->place_mm2[k][0] = eits_fma(unit, place[0], eits_fma(either * other[0], other[0], least));
+        f->place_mm2[k][1] = eits_fma(unit, place[1], either * other[0] * other[1]);
+        f->place_mm2[k][2] = eits_fma(unit, place[2], eits_fma(either * other[1], other[1], least));
     }
 }
 
@@ -114,7 +123,7 @@ static int may_fit(const eits_context *ctx, const eits_fit *f)
 /* Whether the shapes explain the frame. */
 static int explains(const eits_context *ctx, const eits_joint *j)
 {
-    return all_finite(j) && j->left < EITS_JOINT_MAX_LEFT * eits_joint_data(ctx);
+    return all_finite(j) && left_beyond_noise(ctx, j) < EITS_JOINT_MAX_LEFT * eits_joint_data(ctx);
 }
 
 /* Whether any two shapes are so near that they may be one. */
@@ -140,7 +149,9 @@ static int is_clear(const eits_context *ctx, const eits_joint *j, const eits_joi
         (fewer > 0 && j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT))
         return 0;
     for (uint32_t k = 0; k < j->count; ++k) {
-        if (!(known[k].rise > EITS_JOINT_CLEAR_RISE * excess))
+        /* one large light touch explains what two near ones do */
+        if (!(known[k].rise > EITS_JOINT_CLEAR_RISE * excess) ||
+            (fewer > 0 && eits_joint_is_light(&j->shape[k])))
             return 0;
     }
     return 1;
@@ -154,6 +165,8 @@ static int fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j, eits_joint
     const uint32_t fewer = eits_joint_merge(j);
     int clear = 0;
     if (!any_near(j) && j->count * j->parameters <= EITS_JOINT_PARAMETERS) {
+        if (fewer == 0)
+            eits_joint_guess_kinds(ctx, j);
         f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, j);
         if (explains(ctx, j)) {
             f->macs += eits_joint_places(ctx, j, known);
@@ -192,6 +205,7 @@ void eits_fit_jointly(eits_context *ctx, eits_fit *f, eits_joint *j)
         return;
     if (f->changed || j->count == 0) {
         *j = begin(ctx, f, j->spent);
+        eits_joint_guess_kinds(ctx, j);
         f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, j);
     }
     if (!explains(ctx, j) || (f->drifts && eits_joint_excess(ctx, j) > EITS_JOINT_FITTED))

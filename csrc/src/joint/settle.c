@@ -32,6 +32,7 @@ uint64_t eits_joint_settle(eits_context *ctx, eits_joint *j)
         j->misfit > folds + EITS_JOINT_FITS && macs + 3u * (macs - begin) < EITS_JOINT_WORK)
         try_ellipses(ctx, j, &macs);
     macs += eits_joint_split(ctx, j, macs);
+    eits_joint_choose_kinds(ctx, j, macs - begin, &macs);
     j->spent = macs;
     return macs - begin;
 }

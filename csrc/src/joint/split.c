@@ -27,6 +27,7 @@ static uint32_t longest(const eits_joint *j, const uint8_t *tried)
 static eits_joint as_two(const eits_joint *one, uint32_t k)
 {
     eits_joint two = *one;
+    two.shape[k] = eits_joint_as_strong(&one->shape[k]);
     eits_shape *a = &two.shape[k], *b = &two.shape[two.count++];
     const eits_real away = EITS_JOINT_SPLIT_AWAY * a->radius;
     eits_real axis[2];
@@ -51,11 +52,21 @@ static int are_two(const eits_shape *a, const eits_shape *b)
            p / q > EITS_JOINT_SPLIT_WEAKER && q / p > EITS_JOINT_SPLIT_WEAKER;
 }
 
+/* A light touch that is as large as two strong ones: the data hardly tell it from these, so they are
+ * tried though it fits, and have to lower F by less. */
+static int is_large(const eits_context *ctx, const eits_shape *s)
+{
+    return eits_joint_is_light(s) &&
+           eits_joint_offset(ctx, s, 2) > EITS_JOINT_LIGHT_LARGE;
+}
+
 /* Whether the two that shape k became stand, beside `one`. */
 static int stand(const eits_context *ctx, const eits_joint *one, const eits_joint *two, uint32_t k)
 {
-    const eits_real excess = eits_joint_excess(ctx, two);
-    return excess < EITS_JOINT_FITTED && one->cost - two->cost > EITS_JOINT_SPLIT_FALL * excess &&
+    const eits_real excess = eits_joint_excess(ctx, two),
+                    fall = is_large(ctx, &one->shape[k]) ? EITS_JOINT_SPLIT_LARGE
+                                                         : EITS_JOINT_SPLIT_FALL;
+    return excess < EITS_JOINT_FITTED && one->cost - two->cost > fall * excess &&
            are_two(&two->shape[k], &two->shape[one->count]);
 }
 
@@ -65,14 +76,15 @@ uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent)
     uint8_t tried[EITS_MAX_TOUCHES] = {0};
     int stale = 0;
     /* where one is wrong the data fit worse than noise does */
-    if (!(j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT))
-        return 0;
+    const int fits = !(j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT);
     while (j->parameters == EITS_JOINT_ELLIPSE && j->count < ctx->options.max_touches &&
            (j->count + 1u) * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS) {
         const uint32_t k = longest(j, tried);
         if (k == j->count)
             break;
         tried[k] = 1;
+        if (fits && !is_large(ctx, &j->shape[k]))
+            continue;
         eits_joint two = as_two(j, k);
         if (!eits_pole_on_skin(ctx, two.shape[k].x, two.shape[k].y) ||
             !eits_pole_on_skin(ctx, two.shape[j->count].x, two.shape[j->count].y))
@@ -82,7 +94,7 @@ uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent)
         two.free[1] = j->count;
         stale = 1;
         eits_pole_clear(ctx, two.count);
-        eits_joint_descend(ctx, &two, 2, j->cost - EITS_JOINT_SPLIT_FALL, &spent);
+        eits_joint_descend(ctx, &two, 2, j->cost - EITS_JOINT_SPLIT_LARGE, &spent);
         if (!stand(ctx, j, &two, k))
             continue;
         two.from[j->count] = j->from[k];

@@ -42,6 +42,7 @@ typedef struct eits_fit {
     eits_real total;       /* |y|^2 */
     /* of that, what noise is expected to give; 0 where none was learned */
     eits_real noise;
+    eits_real beyond_noise; /* what the touches leave of the data beyond that, relative to them */
     /* options.touch_radius_weight, times what the stage of the touch fit asks for */
     eits_real radius_weight;
     uint32_t count;

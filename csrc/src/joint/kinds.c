@@ -1,0 +1,49 @@
+/* Strong or light: where the data leave both open, each shape is tried as the other kind.
+ *
+ * A light touch and a smaller strong one of the same strength answer alike but for the higher
+ * orders, so F has a minimum for each kind, and the first guess, by the priors alone, may lie in
+ * the wrong one. On a skin that is far from the model, its errors hide the higher orders, and the
+ * guess stays. */
+#include "joint/joint.h"
+
+#include "context/places.h"
+#include "joint/constants.h"
+
+/* Whether shape k as the other kind lowers F; *j becomes that. */
+static int turn(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *macs)
+{
+    eits_joint other = *j;
+    other.shape[k] = eits_joint_as_other(&j->shape[k]);
+    other.free_count = 1;
+    other.free[0] = k;
+    eits_pole_clear(ctx, j->count);
+    eits_joint_descend(ctx, &other, 2, R(INFINITY), macs);
+    if (!(other.cost < j->cost))
+        return 0;
+    *j = other;
+    return 1;
+}
+
+void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled, uint64_t *macs)
+{
+    eits_joint_known known[EITS_MAX_TOUCHES];
+    uint32_t tried = 0, turned = 0;
+    if (eits_weighs_errors(ctx)) /* there the model's errors are as large as higher orders */
+        return;
+    *macs += eits_joint_places(ctx, j, known);
+    const eits_real most = EITS_JOINT_OTHER_RISE * eits_joint_excess(ctx, j);
+    for (uint32_t k = 0; k < j->count; ++k) {
+        if (!(known[k].other_rise < most) || *macs + 2u * settled > EITS_JOINT_WORK)
+            continue;
+        ++tried;
+        turned += (uint32_t)turn(ctx, j, k, macs);
+    }
+    if (tried == 0)
+        return;
+    eits_joint_free_all(j);
+    eits_pole_clear(ctx, j->count);
+    if (turned > 0)
+        eits_joint_descend(ctx, j, 2, R(INFINITY), macs);
+    else
+        *macs += eits_joint_evaluate(ctx, j, 2);
+}
