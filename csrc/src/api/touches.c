@@ -68,7 +68,8 @@ static eits_shown shown(const eits_context *ctx, const eits_fit *f, uint32_t fou
     uint32_t drawn = 0;
     for (uint32_t k = 0; k < count; ++k)
         drawn += reported[k].explained > 0;
-    return drawn > 0 && drawn == found && f->beyond_noise < most ? EITS_SHOWN_TOUCHES : EITS_SHOWN_SOLVER;
+    return drawn > 0 && drawn == found && f->beyond_noise < most ? EITS_SHOWN_TOUCHES
+                                                                 : EITS_SHOWN_SOLVER;
 }
 
 eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t room,

@@ -30,10 +30,6 @@
 /* deviation of its logarithm. as JOINT_STRONG_SPREAD */
 #define EITS_JOINT_LIGHT_SPREAD R(0.42)
 
-/* by how much F is higher for a light touch. larger: light touches are taken for small ones;
- * smaller: small ones for light ones */
-#define EITS_JOINT_LIGHT_COST R(1.0)
-
 /* a touch is tried as the other kind, strong or light, where F would rise by less, as linearised.
  * larger: costs; smaller: light touches keep a radius that is too small */
 #define EITS_JOINT_OTHER_RISE R(2.0)

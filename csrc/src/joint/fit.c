@@ -261,8 +261,8 @@ static void know_other(const eits_shape *shape, const eits_real *block, eits_joi
     const eits_real *amplitude = block + EITS_LOWER_SIZE(3); /* row 3 of A^-1 */
     eits_joint_change c;
     eits_joint_other_prior(shape, &c);
-    const eits_real far = c.gradient / eits_larger(eits_fma(c.precision, amplitude[3], 1),
-                                                   EITS_JOINT_MIN_PIVOT);
+    const eits_real far =
+        c.gradient / eits_larger(eits_fma(c.precision, amplitude[3], 1), EITS_JOINT_MIN_PIVOT);
     known->other_rise = c.cost - c.gradient * far * amplitude[3];
     for (uint32_t i = 0; i < 3; ++i)
         known->other_step[i] = far * amplitude[i];

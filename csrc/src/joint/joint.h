@@ -75,8 +75,8 @@ eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_
 eits_real eits_joint_offset(const eits_context *ctx, const eits_shape *s, uint32_t p);
 eits_real eits_joint_precision(const eits_context *ctx, const eits_shape *s, uint32_t p);
 
-/* Whether the shape is likelier a light touch than a strong one; and the shape of its strength q r^2
- * that is strong, or of the kind that it is not. */
+/* Whether the shape is likelier a light touch than a strong one; and the shape of its strength q
+ * r^2 that is strong, or of the kind that it is not. */
 int eits_joint_is_light(const eits_shape *s);
 eits_shape eits_joint_as_strong(const eits_shape *s);
 eits_shape eits_joint_as_other(const eits_shape *s);
@@ -113,9 +113,9 @@ eits_real eits_joint_excess(const eits_context *ctx, const eits_joint *j);
 
 /* What the normal equations where the touches are tell of a touch, all other parameters free. */
 typedef struct eits_joint_known {
-    eits_real place[3]; /* covariance of x and y, pixels^2: xx, xy, yy */
-    eits_real shape;    /* how far e1 and e2 are from 0, in variances; 0 for a disc */
-    eits_real rise;     /* of F where its amplitude is 0 and the others make up for it */
+    eits_real place[3];   /* covariance of x and y, pixels^2: xx, xy, yy */
+    eits_real shape;      /* how far e1 and e2 are from 0, in variances; 0 for a disc */
+    eits_real rise;       /* of F where its amplitude is 0 and the others make up for it */
     eits_real log_radius; /* variance */
     /* if it were of the other kind: the rise of F, and where x, y and log radius would be */
     eits_real other_rise, other_step[3];

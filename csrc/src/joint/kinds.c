@@ -2,8 +2,8 @@
  *
  * A light touch and a smaller strong one of the same strength answer alike but for the higher
  * orders, so F has a minimum for each kind, and the first guess, by the priors alone, may lie in
- * the wrong one. On a skin that is far from the model, its errors hide the higher orders, and the
- * guess stays. */
+ * the wrong one. On a skin that is far from the model, and where the shapes do not fit, errors hide
+ * the higher orders, and the guess stays. */
 #include "joint/joint.h"
 
 #include "context/places.h"
@@ -18,7 +18,7 @@ static int turn(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *macs)
     other.free[0] = k;
     eits_pole_clear(ctx, j->count);
     eits_joint_descend(ctx, &other, 2, R(INFINITY), macs);
-    if (!(other.cost < j->cost))
+    if (!(j->cost - other.cost > EITS_JOINT_SETTLED))
         return 0;
     *j = other;
     return 1;
@@ -28,7 +28,7 @@ void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled,
 {
     eits_joint_known known[EITS_MAX_TOUCHES];
     uint32_t tried = 0, turned = 0;
-    if (eits_weighs_errors(ctx)) /* there the model's errors are as large as higher orders */
+    if (eits_weighs_errors(ctx) || !(eits_joint_excess(ctx, j) < EITS_JOINT_FITTED))
         return;
     *macs += eits_joint_places(ctx, j, known);
     const eits_real most = EITS_JOINT_OTHER_RISE * eits_joint_excess(ctx, j);

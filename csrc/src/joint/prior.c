@@ -4,7 +4,7 @@
  * two come from what touches are expected to be. Radii spread about that of a fit's seed. Touches
  * are of two kinds: strong ones, of a contrast of 3 to 10 or of .1 to .5, and light ones, of 1.15
  * to 2 or of .5 to .87. Each kind has a normal prior of log |q|, and the prior's part of F is the
- * lesser of the two; a light touch costs a little more, since it is rarer. */
+ * lesser of the two. */
 #include "joint/joint.h"
 
 #include "base/log.h"
@@ -13,12 +13,12 @@
 
 /* Touches whose log |q| is about that of `amplitude`, within `spread`. */
 typedef struct kind {
-    eits_real amplitude, spread, cost;
+    eits_real amplitude, spread;
 } kind;
 
-static const kind LIGHT = {EITS_JOINT_LIGHT, EITS_JOINT_LIGHT_SPREAD, EITS_JOINT_LIGHT_COST},
-                  STRONG = {EITS_JOINT_STRONG, EITS_JOINT_STRONG_SPREAD, 0},
-                  INSULATING = {EITS_JOINT_INSULATING, EITS_JOINT_INSULATING_SPREAD, 0};
+static const kind LIGHT = {EITS_JOINT_LIGHT, EITS_JOINT_LIGHT_SPREAD},
+                  STRONG = {EITS_JOINT_STRONG, EITS_JOINT_STRONG_SPREAD},
+                  INSULATING = {EITS_JOINT_INSULATING, EITS_JOINT_INSULATING_SPREAD};
 
 static const kind *strong_kind(const eits_shape *s)
 {
@@ -40,7 +40,7 @@ static eits_real off_from(const kind *of, const eits_shape *s)
 static eits_real cost_as(const kind *of, const eits_shape *s)
 {
     const eits_real off = off_from(of, s) / of->spread;
-    return eits_fma(off, off, of->cost);
+    return off * off;
 }
 
 /* The kind that the shape is likelier to be. */
@@ -83,7 +83,7 @@ eits_real eits_joint_precision(const eits_context *ctx, const eits_shape *s, uin
 
 eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_t parameters)
 {
-    eits_real sum = kind_of(s)->cost;
+    eits_real sum = 0;
     for (uint32_t p = 2; p < parameters; ++p) {
         const eits_real off = eits_joint_offset(ctx, s, p) / deviation(s, p);
         sum = eits_fma(off, off, sum);

@@ -52,20 +52,19 @@ static int are_two(const eits_shape *a, const eits_shape *b)
            p / q > EITS_JOINT_SPLIT_WEAKER && q / p > EITS_JOINT_SPLIT_WEAKER;
 }
 
-/* A light touch that is as large as two strong ones: the data hardly tell it from these, so they are
- * tried though it fits, and have to lower F by less. */
+/* A light touch that is as large as two strong ones: the data hardly tell it from these, so they
+ * are tried though it fits, and have to lower F by less. */
 static int is_large(const eits_context *ctx, const eits_shape *s)
 {
-    return eits_joint_is_light(s) &&
-           eits_joint_offset(ctx, s, 2) > EITS_JOINT_LIGHT_LARGE;
+    return eits_joint_is_light(s) && eits_joint_offset(ctx, s, 2) > EITS_JOINT_LIGHT_LARGE;
 }
 
 /* Whether the two that shape k became stand, beside `one`. */
 static int stand(const eits_context *ctx, const eits_joint *one, const eits_joint *two, uint32_t k)
 {
-    const eits_real excess = eits_joint_excess(ctx, two),
-                    fall = is_large(ctx, &one->shape[k]) ? EITS_JOINT_SPLIT_LARGE
-                                                         : EITS_JOINT_SPLIT_FALL;
+    const eits_real excess = eits_joint_excess(ctx, two), fall = is_large(ctx, &one->shape[k])
+                                                                     ? EITS_JOINT_SPLIT_LARGE
+                                                                     : EITS_JOINT_SPLIT_FALL;
     return excess < EITS_JOINT_FITTED && one->cost - two->cost > fall * excess &&
            are_two(&two->shape[k], &two->shape[one->count]);
 }
