@@ -14,10 +14,10 @@
  * moves touches; smaller: misplaced electrodes do */
 #define EITS_MAX_SHIFT R(1.0)
 
-/* the joint fit weighs the model's errors where the reference is further from the model
- * [row_errors.distance]. larger: uneven skins are fitted as if they were the model; smaller: good
- * skins lose data */
-#define EITS_ERRORS_FROM R(0.33)
+/* places are corrected for a fit that weighs the model's errors where the reference is further from
+ * the model [row_errors.distance]. larger: uneven skins are fitted as if they were the model;
+ * smaller: good skins lose data */
+#define EITS_ERRORS_FROM R(0.15)
 
 /* clang-format on */
 

@@ -125,6 +125,13 @@
 /* touches that are nearer are tested [of the sum of radii]. as JOINT_CLEAR_RISE */
 #define EITS_JOINT_CLEAR_APART R(1.8)
 
+/* and of what the skin's errors leave of a place: so much of what the test of touches takes for it.
+ * as JOINT_PLACE_MIN */
+#define EITS_JOINT_PLACE_SHARE R(1.6)
+
+/* factor of a light touch's covariance: its radius is known least. as JOINT_PLACE_MIN */
+#define EITS_JOINT_PLACE_LIGHT R(1.4)
+
 /* least variance of a place along each axis [pixels^2]. larger: places look less certain than they
  * are; smaller: more */
 #define EITS_JOINT_PLACE_MIN R(5e-05)

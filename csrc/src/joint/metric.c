@@ -1,7 +1,7 @@
 /* The metric of the joint fit, and what no touch causes.
  *
  * Folds have independent noise of one variance. Beside it, the data may have any amount of the
- * drift of the gain, and, on a skin that is far from the model, the model's errors: the second
+ * drift of the gain, and the model's errors: the second
  * moment s |d|^2 sum e e' (section ROWE), where s grows with the square of the distance of the
  * reference from the model. With W the weights, B the columns W e s^1/2 |d| and g the direction of
  * the drift in that metric,
@@ -68,8 +68,6 @@ static eits_real fold_variance(const eits_context *ctx, eits_real energy)
 /* s |d|^2 */
 static eits_real error_energy(const eits_context *ctx, eits_real energy)
 {
-    if (!eits_weighs_errors(ctx))
-        return 0;
     const eits_real far = ctx->reference.distance / (eits_real)ctx->model->row_errors.distance;
     return EITS_JOINT_ERROR_SHARE * (far < 1 ? far * far : 1) * energy;
 }

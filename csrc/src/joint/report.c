@@ -80,8 +80,9 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
 {
     const eits_model *model = ctx->model;
     const eits_real pixel = (eits_real)model->pixel_mm, sheet = eits_pole_sheet(model),
-                    least = eits_variance_of_all(ctx, EITS_JOINT_PLACE_MIN),
-                    excess = eits_joint_excess(ctx, j), unit = pixel * pixel * excess;
+                    least =
+                        EITS_JOINT_PLACE_SHARE * eits_variance_of_all(ctx, EITS_JOINT_PLACE_MIN),
+                    excess = eits_joint_excess(ctx, j);
     const eits_real whole = eits_joint_data(ctx);
     ctx->info.unexplained = whole > 0 && j->left > 0 ? j->left / whole : 0;
     f->beyond_noise = whole > 0 ? left_beyond_noise(ctx, j) / whole : 0;
@@ -89,7 +90,9 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
     f->joint = 1;
     for (uint32_t k = 0; k < j->count; ++k) {
         const eits_shape *s = &j->shape[k];
-        const eits_real *place = known[k].place;
+        const eits_real *place = known[k].place,
+                        unit = pixel * pixel * excess *
+                               (eits_joint_is_light(s) ? EITS_JOINT_PLACE_LIGHT : 1);
         eits_disc *d = &f->disc[k];
         f->explained[k] = whole > 0 ? known[k].rise / whole : 0;
         d->polarity = s->amplitude < 0 ? R(-1) : R(1);

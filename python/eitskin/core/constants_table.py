@@ -15,7 +15,7 @@ FORM_MAX_NORM = 1.01
 
 # context
 MAX_SHIFT = 1.0
-ERRORS_FROM = 0.33
+ERRORS_FROM = 0.15
 
 # frame
 MAX_ROW_GAIN = 3.0
