@@ -54,6 +54,8 @@ static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fi
         note_unexplained(ctx, f);
     }
     eits_check_crowd(ctx, found, eits_report_touches(ctx, f, found));
+    if (f->count > 0)
+        eits_recheck_stale_reference(ctx);
     if (!clear)
         eits_fit_jointly(ctx, f, &j);
 }

@@ -155,6 +155,7 @@ typedef struct eits_range {
     eits_real *shrink;        /* stride: shrinkage weight per direction when predicting d */
     eits_real *off_range;     /* n_folded: the part of gain drift that lies outside the range */
     uint32_t off_range_build; /* the projection.builds that it belongs to */
+    uint32_t against;         /* 1: this frame's change goes against the sign of touches */
 } eits_range;
 
 /* The image and the solvers' working memory. Written by solve. x, image and warm outlive a solve;

@@ -105,6 +105,22 @@
  * larger: touches are lost without a word; smaller: hands on small pads are reported */
 #define EITS_STALE_SCALE R(2.0)
 
+/* ---- Chosen: by hand: 16 frames of 8 and 16 electrodes with a touch in the reference leave at
+ * least .3 on 16, ring7 on 8 electrodes leaves at most .005. Check: scripts/test
+ * tests/python/acceptance/test_library_scenes.py */
+
+/* touches that leave less explain a frame with their sign, and what goes against it are lobes of
+ * few electrodes [of |y|^2]. larger: a reference with a touch in it goes unnoticed; smaller: as
+ * STALE_RATIO */
+#define EITS_STALE_EXPLAINED R(0.05)
+
+/* ---- Chosen: by counting: a disc has a place and a strength. Check: scripts/test
+ * tests/python/acceptance/test_library_scenes.py */
+
+/* touches with more than this many numbers each than there are data cannot be separated. larger:
+ * few electrodes report crowds that are right */
+#define EITS_CROWD_NUMBERS 3
+
 /* ---- Chosen: on a hydrogel skin taught by its first 100 presses, seven streams of 60 from press
  * 100 to 340: 1 false touch, 2 of 420 presses held back; .3 whatever max(S'y) is: false touches
  * stop the reference in five. Check: eitskin study teaching --data FOLDER */

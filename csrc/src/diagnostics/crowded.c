@@ -60,12 +60,17 @@ static eits_real score(const eits_context *ctx, const eits_touch *touches, uint3
     return eits_fma(EITS_CROWD_CLEAREST, clear, sum);
 }
 
+int eits_is_faint(const eits_context *ctx)
+{
+    return ctx->info.lambda_max < EITS_CROWD_FAINT * ctx->info.lambda_noise;
+}
+
 void eits_check_crowd(eits_context *ctx, const eits_touch *touches, uint32_t count)
 {
     ctx->info.diagnostics &= ~(uint32_t)EITS_DIAGNOSTIC_CROWDED;
-    if (count == 0 || !eits_wants(ctx, EITS_DIAGNOSTIC_CROWDED) ||
-        ctx->info.lambda_max < EITS_CROWD_FAINT * ctx->info.lambda_noise)
+    if (count == 0 || !eits_wants(ctx, EITS_DIAGNOSTIC_CROWDED) || eits_is_faint(ctx))
         return;
-    if (count >= ctx->options.max_touches || score(ctx, touches, count) < EITS_CROWD_MIN)
+    if (count >= ctx->options.max_touches || EITS_CROWD_NUMBERS * count > ctx->model->rank ||
+        score(ctx, touches, count) < EITS_CROWD_MIN)
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_CROWDED;
 }

@@ -68,9 +68,13 @@ void eits_learn_range(eits_context *ctx);
  * be 1. */
 int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs);
 
-/* Set STALE_REFERENCE if the change has a sign that touches cannot have. `gradient` is S'y;
- * info.lambda_max must be known. */
+/* Set STALE_REFERENCE, and range.against, if the change has a sign that touches cannot have.
+ * `gradient` is S'y; info.lambda_max must be known. */
 void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient);
+
+/* Withdraw that where touches explain the frame: few electrodes give a touch lobes of the other
+ * sign. info.unexplained must be known, of at least one touch. */
+void eits_recheck_stale_reference(eits_context *ctx);
 
 /* Set STALE_REFERENCE if the frame has another scale than the reference. On entry rows.unusable
  * marks all rows that are left out. */
@@ -90,6 +94,9 @@ eits_real eits_noise_energy(const eits_context *ctx);
 
 /* The part of |y|^2 that this noise causes. */
 eits_real eits_expected_noise(const eits_context *ctx);
+
+/* Whether max(S'y) may be noise: then no frame is crowded. */
+int eits_is_faint(const eits_context *ctx);
 
 /* Set CROWDED if `count` touches are more than can be separated. info.unexplained must be known. */
 void eits_check_crowd(eits_context *ctx, const eits_touch *touches, uint32_t count);

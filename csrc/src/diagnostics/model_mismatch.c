@@ -120,6 +120,7 @@ int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, ui
 void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient)
 {
     const eits_sign sign = ctx->options.sign;
+    ctx->range.against = 0;
     if (sign == EITS_SIGN_BOTH || !eits_wants(ctx, EITS_DIAGNOSTIC_STALE_REFERENCE))
         return;
     const eits_sign other = sign == EITS_SIGN_INCREASE ? EITS_SIGN_DECREASE : EITS_SIGN_INCREASE;
@@ -127,8 +128,17 @@ void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient)
      * at the tare, seen from behind. */
     const eits_real against = eits_greatest(ctx->kernels, gradient, ctx->model->n_pixels, other);
     const eits_real min = EITS_STALE_NOISE * ctx->info.lambda_noise;
-    if (min > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > min)
-        ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
+    if (!(min > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > min))
+        return;
+    /* Of another scale, too: touches do not explain that. */
+    ctx->range.against = (ctx->info.diagnostics & EITS_DIAGNOSTIC_STALE_REFERENCE) == 0;
+    ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
+}
+
+void eits_recheck_stale_reference(eits_context *ctx)
+{
+    if (ctx->range.against != 0 && ctx->info.unexplained < EITS_STALE_EXPLAINED)
+        ctx->info.diagnostics &= ~(uint32_t)EITS_DIAGNOSTIC_STALE_REFERENCE;
 }
 
 /* The direction of gain drift is ignored, so that a frame of many times the reference's size would

@@ -105,7 +105,7 @@ void eits_place_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit
 
 void eits_check_count(eits_context *ctx, const eits_fit *f)
 {
-    if (!f->tested || !eits_wants(ctx, EITS_DIAGNOSTIC_CROWDED))
+    if (!f->tested || !eits_wants(ctx, EITS_DIAGNOSTIC_CROWDED) || eits_is_faint(ctx))
         return;
     for (uint32_t k = 0; k < f->count; ++k) {
         if (ctx->evidence.spent || f->pair[k] > EITS_PAIR_ODDS ||

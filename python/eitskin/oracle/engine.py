@@ -21,6 +21,7 @@ from eitskin.core.constants_table import (
     MIN_SQUARE,
     NOISE_ROUNDING,
     SHOWN_UNTESTED,
+    STALE_EXPLAINED,
 )
 from eitskin.core.diagnostics import with_diagnostics
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
@@ -266,7 +267,7 @@ class OracleEngine:
         problem, x, iterations, stop = self._solve(seen.y, seen, lambda_noise)
         correlation = seen.s.T @ seen.y
         lambda_max = greatest(correlation, self.options.sign)
-        stale(correlation, self.options, lambda_noise, seen.found)
+        against = stale(correlation, self.options, lambda_noise)
         if ref.far:
             seen.found.say("unlike the model")
         weight = self.model.column_weight.astype(float)
@@ -282,6 +283,9 @@ class OracleEngine:
             clearness = lambda_max / lambda_noise if lambda_noise > 0 else np.inf
             if crowded(self.model, reported, self.options, unexplained, clearness):
                 seen.found.say("crowded")
+            against = against and not (discs and unexplained < STALE_EXPLAINED)
+        if against:
+            seen.found.say("stale reference")
         solved = stop in ("iterations", "gap", "optimum")
         self._last = x if solved else None
         gap, norm = problem.gap(x) if solved else 0.0, float(np.linalg.norm(problem.y))

@@ -277,15 +277,14 @@ def scaled(frame: FloatArray, ref: Reference, unusable: BoolArray, found: Found)
 # ---- after the solve ----
 
 
-def stale(correlation: FloatArray, options: Options, lambda_noise: float, found: Found) -> None:
-    """S'y goes the way that touches cannot, more than the other way and than noise."""
+def stale(correlation: FloatArray, options: Options, lambda_noise: float) -> bool:
+    """Whether S'y goes the way that touches cannot, more than the other way and than noise."""
     if options.sign == "both" or not lambda_noise > 0:
-        return
+        return False
     other = "decrease" if options.sign == "increase" else "increase"
     against = greatest(correlation, other)
     ahead = greatest(correlation, options.sign)
-    if against > limits.STALE_RATIO * ahead and against > limits.STALE_NOISE * lambda_noise:
-        found.say("stale reference")
+    return against > max(limits.STALE_RATIO * ahead, limits.STALE_NOISE * lambda_noise)
 
 
 def crowded(
@@ -312,4 +311,7 @@ def crowded(
     score += limits.CROWD_WIDEST * max(t.radius_mm for t in touches) / options.touch_seed_radius_mm
     score += limits.CROWD_LEFT * np.sqrt(unexplained) + limits.CROWD_CLEAREST * clear
     score += limits.CROWD_WEAKEST * min(limits.CROWD_STRONG, np.sqrt(weakest) * clearness)
-    return len(touches) >= options.max_touches or bool(score < limits.CROWD_MIN)
+    numbers = limits.CROWD_NUMBERS * len(touches)
+    if len(touches) >= options.max_touches or numbers > model.rank:
+        return True
+    return bool(score < limits.CROWD_MIN)

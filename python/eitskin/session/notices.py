@@ -23,7 +23,8 @@ _NAMES = {
     FaultCode.STALE_REFERENCE: "stale reference",
     FaultCode.UNLIKE_MODEL: "unlike the model",
 }
-_DOUBTFUL = frozenset(_NAMES[code] for code in DOUBTFUL_FAULTS)
+# A touch that lands, moves or lifts within a scan gives single frames of these.
+_DOUBTFUL = frozenset(_NAMES[code] for code in DOUBTFUL_FAULTS) | {"outlier", "crowded"}
 _OF_ELECTRODES = {
     "electrode open": "open",
     "electrodes bridged": "bridged",

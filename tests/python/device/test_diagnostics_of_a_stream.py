@@ -17,7 +17,13 @@ from eitskin.device.open import open_device
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.simulated import SimBoard, SimTransport
 from eitskin.device.wire.codec import Decoder, encode
-from eitskin.device.wire.link_table import FAULT_CLEAR_FRAMES, FaultCode, PacketType, Stream
+from eitskin.device.wire.link_table import (
+    FAULT_CLEAR_FRAMES,
+    FAULT_RAISE_FRAMES,
+    FaultCode,
+    PacketType,
+    Stream,
+)
 from eitskin.device.wire.packets import Fault, Solved, SolvedTouches
 from eitskin.errors import DeviceError
 from eitskin.scene.board_frames import BoardFrames
@@ -184,8 +190,9 @@ def test_what_only_heads_tell_is_said_once_and_when_it_is_over():
     events, nearly = Novelty(), FAULT_CLEAR_FRAMES - 1
     outlier = {"diagnostics": bits("outlier"), "outliers": 1}
     assert events.lines(solved(1)) == []
-    assert events.lines(solved(2, **outlier)) == ["1 row left out as an outlier, frame 2"]
-    assert events.lines(solved(3, **outlier)) == []
+    said = [events.lines(solved(frame, **outlier)) for frame in range(FAULT_RAISE_FRAMES + 1)]
+    line = f"1 row left out as an outlier, frame {FAULT_RAISE_FRAMES - 1}"
+    assert said == [[]] * (FAULT_RAISE_FRAMES - 1) + [[line], []]
     assert [events.lines(solved(4 + k)) for k in range(nearly)] == [[]] * nearly
     assert events.lines(solved(20, **outlier)) == []  # it came back in time
     said = [events.lines(solved(21 + k)) for k in range(FAULT_CLEAR_FRAMES)]
