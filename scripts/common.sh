@@ -94,17 +94,22 @@ make_environment() {
 }
 
 # install_package EXTRAS: the project with these extras in the virtual environment, unless nothing changed since; with it what only
-# a checkout has: the emulated board.
+# a checkout has: the emulated board, and for tests the instrument's circuit.
 install_package() {
     stamp=$venv/installed-$(printf '%s' "$1" | tr ',' '-')
     make_environment
-    if changed_since "$stamp" "$root/python" "$root/firmware" "$root/csrc" "$root/cmake" "$root/CMakeLists.txt" "$root/pyproject.toml"; then
+    if changed_since "$stamp" "$root/python" "$root/firmware" "$root/csrc" "$root/cmake" "$root/CMakeLists.txt" "$root/pyproject.toml" \
+        "$root/hardware/eitskin_hardware" "$root/hardware/pyproject.toml"; then
         find_python
         say "installing eitskin[$1]: packages, and compiling the C core; about half a minute"
         touch "$stamp.next"
         again="eitskin eitskin-emulator"
         case $1 in
         build) packages "$root[$1]" ;;
+        test)
+            again="$again eitskin-hardware"
+            packages "$root[$1]" "$root/firmware/emulator" "$root/hardware"
+            ;;
         *) packages "$root[$1]" "$root/firmware/emulator" ;;
         esac
         mv "$stamp.next" "$stamp"

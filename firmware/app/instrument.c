@@ -62,6 +62,16 @@ static void set_leds(fw_instrument *instrument)
     instrument->leds = leds;
 }
 
+/* Without +-15 V no current flows and each row reads about nothing: say why. */
+static void check_analog_supply(fw_instrument *instrument)
+{
+    const fw_board *board = instrument->board;
+    if (board->system->analog_supply == NULL)
+        return;
+    const bool missing = !board->system->analog_supply(board->system_ctx);
+    fw_fault_set(&instrument->safety, EITS_FAULT_ANALOG_SUPPLY, missing, (fw_fault_detail){0});
+}
+
 static bool process_frame(fw_instrument *instrument)
 {
     fw_frame *frame = fw_acquire_take(&instrument->acquire);
@@ -82,6 +92,7 @@ bool fw_instrument_step(fw_instrument *instrument)
     const bool heard = fw_link_read(&instrument->link);
     const bool framed = process_frame(instrument);
     fw_current_check(&instrument->safety, fw_acquire_running(&instrument->acquire));
+    check_analog_supply(instrument);
     fw_scanning_watch(&instrument->link);
     fw_upload_check(&instrument->link);
     set_leds(instrument);

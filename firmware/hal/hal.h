@@ -132,6 +132,7 @@ typedef struct fw_system_ops {
     /* `work` runs soon, after the interrupts and before the main loop continues. It is always the
      * same function. Called from the capture's interrupt, the main loop, or `work`. */
     void (*later)(void *ctx, void (*work)(void *user), void *user);
+    bool (*analog_supply)(void *ctx); /* +-15 V are there; NULL: the board cannot tell */
 } fw_system_ops;
 
 /* What the start-up code found in memory that survives a reset. */

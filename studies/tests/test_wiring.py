@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from eitskin_studies.pictures.wiring import MULTIPLEXERS, WIRES, Wire
+from eitskin_hardware.circuit.nucleo import MULTIPLEXERS, WIRES, Wire
 from eitskin_studies.pictures.wiring_picture import draw_wiring
 
 ROOT = Path(__file__).resolve().parents[2]

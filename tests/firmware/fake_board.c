@@ -365,6 +365,11 @@ static bool button(void *ctx)
     return ((fake_board *)ctx)->button;
 }
 
+static bool analog_supply(void *ctx)
+{
+    return !((fake_board *)ctx)->supply_missing;
+}
+
 static uint32_t measure_ua_rms(void *ctx)
 {
     return ((fake_board *)ctx)->current_ua;
@@ -375,9 +380,9 @@ static const fw_lines_ops LINES = {lines_write, lines_wait};
 static const fw_capture_ops CAPTURE = {capture_configure, capture_start, capture_stop};
 static const fw_link_ops LINK = {link_write, link_read, link_ended};
 static const fw_store_ops STORE = {store_bank, store_erase, store_program};
-static const fw_system_ops SYSTEM = {time_us,       system_wait,  system_lock, system_unlock,
-                                     feed_watchdog, system_reset, stack_used,  system_set_leds,
-                                     button,        system_later};
+static const fw_system_ops SYSTEM = {time_us,       system_wait,  system_lock,  system_unlock,
+                                     feed_watchdog, system_reset, stack_used,   system_set_leds,
+                                     button,        system_later, analog_supply};
 
 void fake_restart(fake_board *f)
 {

@@ -90,6 +90,7 @@ typedef struct fake_board {
 
     uint32_t feeds, resets, leds;
     bool button;         /* the owner holds it */
+    bool supply_missing; /* +-15 V are not there */
     uint32_t current_ua; /* that flows */
     _Alignas(16) uint8_t workspace[FAKE_WORKSPACE];
 

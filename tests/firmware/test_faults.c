@@ -194,6 +194,20 @@ TEST(test_hysteresis)
     CHECK_EQUAL(fw_faults_raised(safety), 0);
 }
 
+TEST(test_analog_supply)
+{
+    bench_start(&b, &SKIN_ADJACENT);
+    CHECK_EQUAL(reports(EITS_FAULT_ANALOG_SUPPLY, true), 0);
+    b.board.supply_missing = true;
+    host_run(&b.host, 50);
+    CHECK_EQUAL(reports(EITS_FAULT_ANALOG_SUPPLY, true), 1); /* once */
+    CHECK((b.board.leds & 4u) != 0);
+    b.board.supply_missing = false;
+    host_run(&b.host, 50);
+    CHECK_EQUAL(reports(EITS_FAULT_ANALOG_SUPPLY, false), 1);
+    CHECK_EQUAL(host_info(&b.host).faults & 1u << EITS_FAULT_ANALOG_SUPPLY, 0);
+}
+
 TEST(test_watchdog_is_fed)
 {
     bench_start(&b, &SKIN_ADJACENT);

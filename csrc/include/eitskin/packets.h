@@ -183,9 +183,11 @@ typedef enum eits_fault {
     /* the board restarted because its supply fell below 2.9 V */
     EITS_FAULT_SUPPLY = 18,
     /* the locked board refused a command; index: its packet type */
-    EITS_FAULT_LOCKED = 19
+    EITS_FAULT_LOCKED = 19,
+    /* the analog supply of +-15 V, or one half of it, is missing */
+    EITS_FAULT_ANALOG_SUPPLY = 20
 } eits_fault;
-#define EITS_FAULTS 20u
+#define EITS_FAULTS 21u
 
 /* ELECTRODE_OPEN, SATURATED and BRIDGED rise in the frame that shows them, MODEL_MISMATCH,
  * ELECTRODE_NOISY, STALE_REFERENCE and UNLIKE_MODEL with the third in a row, since a touch that

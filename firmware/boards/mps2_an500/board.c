@@ -41,9 +41,9 @@ static void set_leds(void *ctx, uint32_t leds)
     (void)leds;
 }
 
-static const fw_system_ops system_ops = {mps2_time_us,  mps2_wait, mps2_lock,  mps2_unlock,
-                                         feed_watchdog, restart,   stack_used, set_leds,
-                                         NULL,          mps2_later};
+static const fw_system_ops system_ops = {mps2_time_us,  mps2_wait,  mps2_lock,  mps2_unlock,
+                                         feed_watchdog, restart,    stack_used, set_leds,
+                                         NULL,          mps2_later, NULL};
 
 int main(void)
 {

@@ -5,7 +5,7 @@
 enum { LED_GREEN = 0, LED_BLUE = 7, LED_RED = 14 }; /* of port B: LD1, LD2, LD3 (UM1974 6.5) */
 
 /* If the main loop makes no turn for so long, the multiplexers open, or the board restarts. */
-enum { STALLED_MS = 900, HUNG_MS = 8000, BUTTON = 13 };
+enum { STALLED_MS = 900, HUNG_MS = 8000, BUTTON = 13, SUPPLY_GOOD = 11 };
 /* Reload values at 32 kHz (17 to 47 by the data sheet): 0.5 s (at most 0.94) by a divider of 4, 8 s
  * by 64, more than the longest erase of a sector (4 s), during which the program stands still. */
 enum { WATCHDOG_RELOAD = 4000, DIVIDER_4 = 0, DIVIDER_64 = 4 };
@@ -68,6 +68,7 @@ void nucleo_system_start(void)
     nucleo_pin(GPIOB_BASE, LED_RED, PIN_OUTPUT, 0, 0, 0);
 
     nucleo_pin(GPIOC_BASE, BUTTON, PIN_INPUT, 0, 0, 0); /* B1 has its own resistor */
+    nucleo_pin(GPIOC_BASE, SUPPLY_GOOD, PIN_INPUT, 0, 0, 1);
 
     /* The supply's detector at 2.9 V. */
     PWR_CR1 |= 7u << PWR_CR1_PLS_POS | PWR_CR1_PVDE;
@@ -168,6 +169,14 @@ static bool button(void *ctx)
     return (GPIO_IDR(GPIOC_BASE) >> BUTTON & 1u) != 0;
 }
 
+/* A board without the supply-good circuit leaves the pin open: the pull-up says that all is well.
+ */
+static bool analog_supply(void *ctx)
+{
+    (void)ctx;
+    return (GPIO_IDR(GPIOC_BASE) >> SUPPLY_GOOD & 1u) != 0;
+}
+
 void nucleo_restart(void *ctx)
 {
     (void)ctx;
@@ -219,4 +228,5 @@ const fw_system_ops nucleo_system_ops = {nucleo_time_us,
                                          stack_used,
                                          set_leds,
                                          button,
-                                         run_later};
+                                         run_later,
+                                         analog_supply};

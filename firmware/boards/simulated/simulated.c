@@ -349,8 +349,8 @@ static const fw_lines_ops MULTIPLEXERS = {write_lines, wait_ns};
 static const fw_capture_ops CAPTURE = {configure, start, stop};
 static const fw_link_ops LINK = {.write = write_bytes, .read = read_bytes};
 static const fw_store_ops STORE = {bank_start, erase, program};
-static const fw_system_ops SYSTEM = {time_us, wait_idle, lock,      unlock, nothing,
-                                     nothing, no_stack,  show_leds, button, later};
+static const fw_system_ops SYSTEM = {time_us,  wait_idle, lock,   unlock, nothing, nothing,
+                                     no_stack, show_leds, button, later,  NULL};
 
 void sim_init(sim_board *sim, const sim_setup *setup)
 {

@@ -1,8 +1,8 @@
 """The current and gain that suit a skin, and whether the instrument's own values do.
 
-The instrument of docs/guide/hardware.md drives 0.5 mA and amplifies by 3. Its current source
-reaches about 12 V with supplies of 15 V, and its converter 1.65 V. A skin that conducts badly needs
-less current; one that conducts well needs more current or gain.
+The instrument of docs/guide/hardware.md drives 0.5 mA and amplifies by 3. Source and return
+together reach 24 V with supplies of 15 V, and its converter 1.65 V. A skin that conducts badly
+needs less current; one that conducts well needs more current or gain.
 """
 
 from dataclasses import dataclass
@@ -14,10 +14,11 @@ from eitskin.frames.homogeneous import voltages_of
 from eitskin.skin.protocol import Protocol
 
 MULTIPLEXERS_OHM = 240.0  # two ADG1206 in the path of the current, data sheet
-SOURCE_REACH_V = 12.0  # greatest output of the Howland source with supplies of 15 V
+SOURCE_REACH_V = 24.0  # of source and driven return together; each reaches 12.8 V
 CONVERTER_REACH_V = 1.65
 SHARE_USED = 0.75  # of the converter's range; the rest is a reserve for contacts and worse skins
 RECEIVER_OHM = 9_900.0  # AD8421: gain 1 + 9.9 kohm / R_G, data sheet
+FILTER_GAIN = 0.989  # of 1 kohm and 470 pF behind it, at 50 kHz
 MAX_GAIN = 100.0
 MAX_CURRENT_A = 5e-3 * 2**0.5  # IEC 60601-1 at 50 kHz, 5 mA rms
 SOURCE_INPUT_V = 1.0  # the current is 1 V over the resistor of the source
@@ -112,7 +113,7 @@ def advice(demand: Demand) -> list[str]:
     ]
     if better != usual:
         source_ohm = SOURCE_INPUT_V / better.current_a
-        gain_ohm = RECEIVER_OHM / (better.gain - 1) if better.gain > 1 else np.inf
+        gain_ohm = RECEIVER_OHM / (better.gain / FILTER_GAIN - 1) if better.gain > 1 else np.inf
         resistor = f"R_G {gain_ohm:,.0f} ohm" if np.isfinite(gain_ohm) else "no R_G"
         lines.append(f"better           {_described(demand, better)}")
         lines.append(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from eitskin.fileio import write_beside
 from eitskin.view.pictures import ELECTRODE, INK, STYLE, load_matplotlib
-from eitskin_studies.pictures.wiring import MULTIPLEXERS, WIRES, Wire
+from eitskin_hardware.circuit.nucleo import MULTIPLEXERS, WIRES, Wire
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -138,8 +138,8 @@ def _board(axes: Axes) -> None:
     ]
     axes.text(5, 60, "on the board:\n" + "\n".join(own), fontsize=SMALL, va="top", linespacing=1.6)
     power = (
-        "3.3 V (CN8-7) and GND (CN8-11):\nAD9833, clamps, REF divider\nAGND: one wire to GND,\nat"
-        " the amplifier"
+        "3.3 V (CN8-7) and GND (CN8-11):\nAD9833\nAVDD (CN10-1) and AGND (CN10-3):\n"
+        "clamps, REF, receiver\nCN8-8, PC11: supply good"
     )
     axes.text(5, 36, power, fontsize=SMALL, va="top", linespacing=1.6)
     axes.text(5, 8, "CN1: USB to the host", fontsize=SMALL, va="top", fontweight="bold")
@@ -156,7 +156,7 @@ def _generator(axes: Axes) -> None:
             DIGITAL,
             label=f"{_pin(wire)}  {name}",
         )
-    source = "low-pass 200 kHz\ngain 3.3: 1 V peak\nHowland, 2 k$\\Omega$:\n0.5 mA peak, no DC"
+    source = "low-pass 200 kHz\ngain 3.3: 1 V peak\nHowland, buffered:\n0.5 mA peak, no DC"
     _box(axes, 59, 58, 15, 14, "current source", source)
     _arrow(axes, [(56, 65), (59, 65)], SIGNAL)
     _arrow(axes, [(74, 65), (MUX_X, 65)], SIGNAL)
@@ -186,8 +186,10 @@ def _multiplexers(axes: Axes) -> None:
         )
         text = f"{wires[0].pin} ... {wires[3].pin}  A0 ... A3,   {wires[4].pin}  EN"
         axes.text(BOARD_EDGE + 1, bus + 0.7, text, fontsize=SMALL, color=DIGITAL, va="bottom")
-    axes.text(MUX_X - 4.4, MUX_Y[1] + 6.4, "AGND", fontsize=SMALL, ha="right", va="center")
-    _arrow(axes, [(MUX_X, MUX_Y[1] + 6.4), (MUX_X - 4, MUX_Y[1] + 6.4)], SIGNAL)
+    axes.text(
+        MUX_X - 4.4, MUX_Y[1] + 6.4, "minus the\nsource", fontsize=SMALL, ha="right", va="center"
+    )
+    _arrow(axes, [(MUX_X - 4, MUX_Y[1] + 6.4), (MUX_X, MUX_Y[1] + 6.4)], SIGNAL)
 
 
 def _skin(axes: Axes) -> None:
@@ -225,7 +227,7 @@ def _skin(axes: Axes) -> None:
     low, high = MUX_Y[-1] + MUX_HEIGHT / 2, MUX_Y[0] + MUX_HEIGHT / 2
     axes.plot([93.0, 93.0], [low, high], color=SIGNAL, linewidth=3.0, zorder=1)
     axes.plot([93.0, x - radius - 2.6], [y, y], color=SIGNAL, linewidth=3.0, zorder=1)
-    note = "S1 of all four to electrode 0,\nS2 to electrode 1 and so on:\n16 wires, screens to AGND"
+    note = "S1 of all four to electrode 0,\nS2 to electrode 1 and so on:\n16 short single wires"
     axes.text(94.5, 66.0, note, fontsize=SMALL, color=SIGNAL, va="top")
 
 
@@ -237,9 +239,9 @@ def _receiver(axes: Axes) -> None:
         17,
         15,
         "amplifier",
-        "AD8421, gain 3\nR$_G$ 4.99 k$\\Omega$\nREF 1.65 V\ninputs 1 M$\\Omega$ to AGND",
+        "AD8421, gain 3\nR$_G$ 4.87 k$\\Omega$\nREF 1.65 V\ninputs 1 M$\\Omega$ to AGND",
     )
-    _box(axes, 35, 18.5, 13, 12, "to 3.3 V", "1 k$\\Omega$, 470 pF\nBAT54S to 3.3 V\nand GND")
+    _box(axes, 35, 18.5, 13, 12, "to 3.3 V", "1 k$\\Omega$, 470 pF\nBAT54S to AVDD\nand AGND")
     for level in (MUX_Y[2] + 2.0, MUX_Y[3] + 7.5):
         _arrow(axes, [(MUX_X, level), (70, level)], SIGNAL)
     (wire,) = _to("output of the receiver")

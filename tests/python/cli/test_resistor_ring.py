@@ -85,23 +85,23 @@ def test_resistors_are_of_the_series():
 ADVICE = {
     "it suits": (
         Demand(row_ohm=500.0, drive_ohm=2000.0),
-        ["0.5 mA, gain 3: source 1 of 12 V, converter 0.75 of 1.65 V: suits"],
+        ["0.5 mA, gain 3: source 1 of 24 V, converter 0.75 of 1.65 V: suits"],
     ),
     "too much for source and converter": (
         Demand(row_ohm=10_000.0, drive_ohm=200_000.0),
         [
-            "0.5 mA, gain 3: source 100 of 12 V, converter 15 of 1.65 V: unsuited",
-            # 12 V / 200 kohm = 0.06 mA, so 1 V / 18 kohm; 1.2375 V / (0.0556 mA 10 kohm) = 2.23
-            "0.0556 mA, gain 2.23: source 11.1 of 12 V, converter 1.24 of 1.65 V",
-            "source resistor 18,000 ohm, R_G 8,065 ohm; FRONT_END_GAIN_PPM 123750,"
-            " SOURCE_UA_RMS 39 in the board's file",
+            "0.5 mA, gain 3: source 100 of 24 V, converter 15 of 1.65 V: unsuited",
+            # 24 V / 200 kohm = 0.12 mA, so 1 V / 9.1 kohm; 1.2375 V / (0.11 mA 10 kohm) = 1.13
+            "0.11 mA, gain 1.13: source 22 of 24 V, converter 1.24 of 1.65 V",
+            "source resistor 9,100 ohm, R_G 71,403 ohm; FRONT_END_GAIN_PPM 123750,"
+            " SOURCE_UA_RMS 78 in the board's file",
         ],
     ),
     "less than the receiver's gain of 1": (
         Demand(row_ohm=60_000.0, drive_ohm=200_000.0),
         [
-            "0.5 mA, gain 3: source 100 of 12 V, converter 90 of 1.65 V: unsuited",
-            "0.0196 mA, gain 1: source 3.92 of 12 V, converter 1.18 of 1.65 V",
+            "0.5 mA, gain 3: source 100 of 24 V, converter 90 of 1.65 V: unsuited",
+            "0.0196 mA, gain 1: source 3.92 of 24 V, converter 1.18 of 1.65 V",
             "source resistor 51,000 ohm, no R_G; FRONT_END_GAIN_PPM 19608,"
             " SOURCE_UA_RMS 14 in the board's file",
         ],
@@ -109,9 +109,9 @@ ADVICE = {
     "hardly anything at the greatest current and gain": (
         Demand(row_ohm=0.1, drive_ohm=250.0),
         [
-            "0.5 mA, gain 3: source 0.125 of 12 V, converter 0.00015 of 1.65 V: unsuited",
-            "6.67 mA, gain 100: source 1.67 of 12 V, converter 0.0667 of 1.65 V",
-            "source resistor 150 ohm, R_G 100 ohm; FRONT_END_GAIN_PPM 666666667,"
+            "0.5 mA, gain 3: source 0.125 of 24 V, converter 0.00015 of 1.65 V: unsuited",
+            "6.67 mA, gain 100: source 1.67 of 24 V, converter 0.0667 of 1.65 V",
+            "source resistor 150 ohm, R_G 99 ohm; FRONT_END_GAIN_PPM 666666667,"
             " SOURCE_UA_RMS 4714 in the board's file",
             "even so the converter is hardly used or clips: change the skin's conductivity or"
             " thickness, or the protocol",

@@ -114,6 +114,12 @@ FAULTS = {
         "locked, frame 70: the locked board refused TARE; its owner must hold the blue button",
         "locked: over, frame 70",
     ),
+    "no analog supply": (
+        FaultCode.ANALOG_SUPPLY, 0, 0,
+        "analog supply, frame 70: the analog supply of +-15 V, or one half of it, is missing;"
+        " switch it on, then measure it at the board",
+        "analog supply: over, frame 70",
+    ),
     "a crash": (
         FaultCode.CRASH, 0, 0,
         "crash, frame 70: the board restarted after a processor fault at pc 0x00000001, lr"

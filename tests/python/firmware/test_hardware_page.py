@@ -16,7 +16,14 @@ MODES = {
     "input": ("PIN_INPUT", 0),
 }
 MULTIPLEXERS = ("I+", "I-", "V+", "V-")
-CONSTANTS = {"BUTTON": 13, "FSYNC": 2, "LED_GREEN": 0, "LED_BLUE": 7, "LED_RED": 14}
+CONSTANTS = {
+    "BUTTON": 13,
+    "SUPPLY_GOOD": 11,
+    "FSYNC": 2,
+    "LED_GREEN": 0,
+    "LED_BLUE": 7,
+    "LED_RED": 14,
+}
 
 
 def firmware_pins() -> dict[str, tuple[str, int]]:
@@ -93,7 +100,7 @@ def test_the_lines_are_in_the_order_of_the_hal():
 
 def test_no_place_is_taken_twice():
     places = [place for wire in WIRES for place in (wire.pin, *wire.places)]
-    assert len(places) == len(set(places)) > len(WIRES) == 32
+    assert len(places) == len(set(places)) > len(WIRES) == 33
 
 
 def test_the_flash_map_is_the_linkers_and_the_stores():

@@ -13,7 +13,8 @@ from eitskin.errors import EXTRAS
 from fresh_python import MAIN, run_python, without
 
 MODULES = sorted({module for packages in EXTRAS.values() for module in packages.values()})
-BARE = without(*MODULES, "unicorn", "eitskin_emulator", "eitskin_studies") + MAIN
+CHECKOUT = ("eitskin_emulator", "eitskin_hardware", "eitskin_studies")
+BARE = without(*MODULES, "unicorn", *CHECKOUT) + MAIN
 MISSING = 9
 PROJECT = load_toml(ROOT / "pyproject.toml", "project")["project"]
 

@@ -11,9 +11,10 @@ ROOT = Path(__file__).resolve().parents[3]
 FOLDERS = {  # where each package stands
     "eitskin": ROOT / "python",
     "eitskin_emulator": ROOT / "firmware" / "emulator",
+    "eitskin_hardware": ROOT / "hardware",
     "eitskin_studies": ROOT / "studies",
 }
-CHECKOUT = ("eitskin_emulator", "eitskin_studies")  # not in the wheel
+CHECKOUT = ("eitskin_emulator", "eitskin_hardware", "eitskin_studies")  # not in the wheel
 
 # Each imports from its own line and those above it alone.
 ORDER = (
@@ -142,7 +143,7 @@ def packages_imported(folder: Path) -> dict[str, set[str]]:
     return found
 
 
-@pytest.mark.parametrize("folder", ["python", "firmware", "tests", "tables"])
+@pytest.mark.parametrize("folder", ["python", "firmware", "hardware", "tests", "tables"])
 def test_the_product_and_its_tests_import_nothing_of_the_studies(folder):
     files = packages_imported(ROOT / folder)
     assert files and [name for name, used in files.items() if "eitskin_studies" in used] == []

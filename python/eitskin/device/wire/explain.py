@@ -197,6 +197,10 @@ def _text(fault: Fault) -> str:
             f"the locked board refused {command_name(fault.index)}; its owner must hold the blue"
             " button"
         ),
+        FaultCode.ANALOG_SUPPLY: (
+            "the analog supply of +-15 V, or one half of it, is missing; switch it on, then measure"
+            " it at the board"
+        ),
     }
     return texts[FaultCode(fault.code)]
 

@@ -134,6 +134,7 @@ class FaultCode(IntEnum):
     CLOCK = 17  # the board restarted because the generator's clock failed
     SUPPLY = 18  # the board restarted because its supply fell below 2.9 V
     LOCKED = 19  # the locked board refused a command; index: its packet type
+    ANALOG_SUPPLY = 20  # the analog supply of +-15 V, or one half of it, is missing
 
 
 class Drive(IntEnum):

@@ -1,5 +1,5 @@
-"""Which pin of the NUCLEO-F767ZI goes where: the table of docs/guide/hardware.md and the drawing
-are made from it.
+"""Which pin of the NUCLEO-F767ZI goes where: the circuit, the table of docs/guide/hardware.md and
+the drawing of the wiring are made from it.
 
 Connectors and pins after ST's UM1974, tables 18 and 25: the Zio connectors CN7 to CN10 take plugs,
 the morpho ones CN11 and CN12 are holes in the board, with every pin of the processor.
@@ -8,6 +8,10 @@ the morpho ones CN11 and CN12 are holes in the board, with every pin of the proc
 from dataclasses import dataclass
 
 MULTIPLEXERS = ("I+", "I-", "V+", "V-")
+
+# Supplies and grounds that the shield uses (UM1974, table 18)
+LOGIC_SUPPLY, GROUND = "CN8-7", "CN8-11"
+ANALOG_SUPPLY, ANALOG_GROUND = "CN10-1", "CN10-3"
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,7 @@ def _wires() -> tuple[Wire, ...]:
     wires += [
         Wire("PA3", "CN9-1", "CN12-37", "ADC1 input 3", "output of the receiver"),
         Wire("PC0", "CN9-3", "CN11-38", "ADC2 input 10", "sense resistor, where fitted"),
+        Wire("PC11", "CN8-8", "CN11-2", "input, pulled up", "supply good"),
         Wire("PC13", "", "", "input", "B1, blue: the owner's button"),
         Wire("PD8", "", "", "USART3 TX, 1 Mbaud", "ST-LINK, on the board"),
         Wire("PD9", "", "", "USART3 RX, 1 Mbaud", "ST-LINK, on the board"),

@@ -1,0 +1,87 @@
+"""Writes the files of ``hardware/made``."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+from eitskin.errors import EitskinError, UsageError
+from eitskin_hardware.circuit.instrument import instrument
+from eitskin_hardware.circuit.lists import parts_csv, parts_page, wiring_page
+from eitskin_hardware.circuit.netlist import Checked, check
+from eitskin_hardware.spice.bench import Bench
+from eitskin_hardware.spice.measure import Numbers, measure_all
+from eitskin_hardware.spice.promises import table
+from eitskin_hardware.spice.skins import skin_load
+
+
+class RulesError(EitskinError):
+    """The circuit breaks an electrical rule."""
+
+
+def texts() -> dict[str, str]:
+    """Return the files that need no simulation, by name."""
+    design = instrument()
+    checked = check()
+    refuse_broken(checked)
+    return {
+        "instrument.net": checked.netlist,
+        "parts.csv": parts_csv(design),
+        "parts.md": parts_page(design),
+        "wiring.md": wiring_page(design),
+        "instrument.cir": deck(),
+    }
+
+
+def refuse_broken(checked: Checked) -> None:
+    """Refuse a circuit that breaks an electrical rule.
+
+    Raises:
+        RulesError: names the first broken rules.
+    """
+    if checked.messages:
+        raise RulesError(
+            f"electrical rules: {'; '.join(checked.messages[:5])}; change circuit/instrument.py"
+        )
+
+
+def deck() -> str:
+    """Return the deck that is shipped: the paper's skin, one row, which prints what is measured
+    first."""
+    bench = Bench(instrument(), skin_load(), (0, 1, 2, 3))
+    names = (
+        "sine",
+        "smooth",
+        "drive_v",
+        "source",
+        "drive",
+        "return",
+        "vplus",
+        "vminus",
+        "received",
+        "converter",
+    )
+    return bench.deck(["ac lin 1 50k 50k", *(f"print vm({name})" for name in names)], linear=True)
+
+
+def results_text(numbers: Numbers) -> str:
+    """Return the results file."""
+    return json.dumps(numbers, indent=1) + "\n"
+
+
+def make_all(folder: Path) -> Iterator[str]:
+    """Write all files into ``folder`` and yield their names.
+
+    Raises:
+        UsageError: the folder is not there.
+        RulesError: the circuit breaks an electrical rule.
+        SpiceError: ngspice is missing or fails.
+    """
+    if not folder.is_dir():
+        raise UsageError(f"-o {folder}: no such folder; run this in a checkout, or make the folder")
+    for name, text in texts().items():
+        (folder / name).write_text(text, encoding="utf-8")
+        yield name
+    numbers = measure_all()
+    for name, text in (("results.json", results_text(numbers)), ("promises.md", table(numbers))):
+        (folder / name).write_text(text, encoding="utf-8")
+        yield name
