@@ -65,7 +65,7 @@ extensions = [
     "hawkmoth",
     "sphinx_copybutton",
 ]
-include_patterns = ["*.md", "docs/**", "studies/results/**"]
+include_patterns = ["*.md", "docs/**", "hardware/*.md", "hardware/made/*.md", "studies/results/**"]
 external_toc_path = "docs/site/_toc.yml"
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
