@@ -1,5 +1,6 @@
 """How near to its bound each hard case came: recorded by tests, gathered over processes, shown at
-the end of a run. ``conftest.py`` takes the hooks from here."""
+the end of a run, and written to the file that ``EITSKIN_MARGINS_FILE`` names. ``conftest.py`` takes
+the hooks from here."""
 
 import json
 import os
@@ -14,6 +15,7 @@ import pytest
 
 TARGETS = ("host f32", "host f64", "M7")
 FOLDER = "EITSKIN_MARGINS"  # of a run: workers of pytest-xdist inherit the environment
+FILE = "EITSKIN_MARGINS_FILE"
 
 
 def share(measured: float, bound: float) -> float:
@@ -84,6 +86,10 @@ def pytest_terminal_summary(terminalreporter):
     for path in Path(os.environ[FOLDER]).glob("*.json"):
         for row in json.loads(path.read_text(encoding="utf-8")):
             found.keep(*row)
+    if FILE in os.environ:
+        rows = [[*key, used, text] for key, (used, text) in sorted(found.worst.items())]
+        lines = ",\n".join(json.dumps(row) for row in rows)
+        Path(os.environ[FILE]).write_text(f"[\n{lines}\n]\n", encoding="utf-8")
     said: dict[str, dict[str, list[str]]] = {}
     for (case, target), (used, text) in found.worst.items():
         said.setdefault(case, {}).setdefault(f"{100 * used:.3g} % ({text})", []).append(target)

@@ -26,7 +26,8 @@ class Case:
         return self.id.split("/")[0]
 
 
-def _file(test: str) -> str:
+def file_of(test: str) -> str:
+    """Return the path of a test's file from the root."""
     return f"tests/python/{test.split('::')[0]}" if "::" in test else test
 
 
@@ -51,7 +52,7 @@ def tests_in(path: Path) -> list[str]:
 
 
 def exists(test: str) -> bool:
-    path = ROOT / _file(test)
+    path = ROOT / file_of(test)
     return path.is_file() and ("::" not in test or test.split("::")[1] in tests_in(path))
 
 

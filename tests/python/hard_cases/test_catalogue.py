@@ -24,6 +24,13 @@ def test_the_page_is_that_of_the_catalogue():
     assert page.PAGE.read_text(encoding="utf-8") == page.page_text()
 
 
+def test_margins_are_those_of_the_catalogue():
+    """No case is left of an older catalogue, and every margin was kept."""
+    assert set(page.margins()) <= {case.id for case in CASES}
+    worst = [share for of in page.margins().values() for share, _ in of.values()]
+    assert len(worst) > 60 and max(worst) <= 1.0
+
+
 def test_pictures_exist():
     for case in CASES:
         if case.picture is not None:
