@@ -182,6 +182,10 @@ typedef struct eits_touch {
      * disc, or the data do not show a shape */
     eits_real long_x_mm;
     eits_real long_y_mm;
+    /* standard deviation of radius_mm; 0 if the data do not tell the radius. Then radius_mm is the
+     * one expected of touches of this strength, and the change of conductivity, the strength over
+     * the area, is not known either */
+    eits_real radius_sd_mm;
 } eits_touch;
 
 /* A name for one bit of eits_diagnostic ("electrode open", "outlier"...), never NULL. */

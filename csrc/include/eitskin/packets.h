@@ -415,6 +415,8 @@ typedef struct eits_packet_touch {
     /* half of the long axis as a vector; 0, 0: a disc, or not known */
     float long_x_mm;
     float long_y_mm;
+    /* standard deviation of the radius; 0: the data do not tell the radius */
+    float radius_sd_mm;
 } eits_packet_touch;
 
 /* Touches as of an instant within a scan. Where nothing touches it is sent once: when that begins,

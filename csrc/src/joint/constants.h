@@ -125,6 +125,14 @@
 /* touches that are nearer are tested [of the sum of radii]. as JOINT_CLEAR_RISE */
 #define EITS_JOINT_CLEAR_APART R(1.8)
 
+/* a radius is known where its logarithm has a smaller deviation. larger: radii that are expected,
+ * not measured, are reported with a deviation; smaller: none is known */
+#define EITS_JOINT_RADIUS_KNOWN R(0.12)
+
+/* and where F would rise by more if the touch were of the other kind, strong or light. as
+ * JOINT_RADIUS_KNOWN */
+#define EITS_JOINT_OTHER_EXCLUDED R(8.0)
+
 /* and of what the skin's errors leave of a place: so much of what the test of touches takes for it.
  * as JOINT_PLACE_MIN */
 #define EITS_JOINT_PLACE_SHARE R(1.6)

@@ -75,24 +75,43 @@ static eits_real doubt(eits_real rise)
     return 1 / (4 * eits_fma(x2, eits_fma(x2, R(1) / 3, 1), 1));
 }
 
+/* How well the place and the radius of a touch are known: by the normal equations, times the excess
+ * of the misfit, and by the distance between what it is as either kind, strong or light. The radius
+ * counts as known where the data exclude the other kind and leave little open within the own one.
+ */
+static void report_spread(const eits_context *ctx, const eits_shape *s,
+                          const eits_joint_known *known, eits_real excess, eits_real *place_mm2,
+                          eits_real *radius_sd_mm)
+{
+    const eits_real pixel = (eits_real)ctx->model->pixel_mm, *other = known->other_step,
+                    rise = known->other_rise / excess, open = doubt(rise),
+                    either = pixel * pixel * open,
+                    least =
+                        EITS_JOINT_PLACE_SHARE * eits_variance_of_all(ctx, EITS_JOINT_PLACE_MIN),
+                    unit = pixel * pixel * excess *
+                           (eits_joint_is_light(s) ? EITS_JOINT_PLACE_LIGHT : 1),
+                    spread =
+                        eits_sqrt(eits_fma(excess, known->log_radius, open * other[2] * other[2]));
+    place_mm2[0] = eits_fma(unit, known->place[0], eits_fma(either * other[0], other[0], least));
+    place_mm2[1] = eits_fma(unit, known->place[1], either * other[0] * other[1]);
+    place_mm2[2] = eits_fma(unit, known->place[2], eits_fma(either * other[1], other[1], least));
+    *radius_sd_mm = spread < EITS_JOINT_RADIUS_KNOWN && rise > EITS_JOINT_OTHER_EXCLUDED
+                        ? spread * pixel * s->radius
+                        : 0;
+}
+
 static void report(eits_context *ctx, const eits_joint *j, const eits_joint_known *known,
                    eits_fit *f)
 {
     const eits_model *model = ctx->model;
     const eits_real pixel = (eits_real)model->pixel_mm, sheet = eits_pole_sheet(model),
-                    least =
-                        EITS_JOINT_PLACE_SHARE * eits_variance_of_all(ctx, EITS_JOINT_PLACE_MIN),
-                    excess = eits_joint_excess(ctx, j);
-    const eits_real whole = eits_joint_data(ctx);
+                    excess = eits_joint_excess(ctx, j), whole = eits_joint_data(ctx);
     ctx->info.unexplained = whole > 0 && j->left > 0 ? j->left / whole : 0;
     f->beyond_noise = whole > 0 ? left_beyond_noise(ctx, j) / whole : 0;
     f->count = j->count;
     f->joint = 1;
     for (uint32_t k = 0; k < j->count; ++k) {
         const eits_shape *s = &j->shape[k];
-        const eits_real *place = known[k].place,
-                        unit = pixel * pixel * excess *
-                               (eits_joint_is_light(s) ? EITS_JOINT_PLACE_LIGHT : 1);
         eits_disc *d = &f->disc[k];
         f->explained[k] = whole > 0 ? known[k].rise / whole : 0;
         d->polarity = s->amplitude < 0 ? R(-1) : R(1);
@@ -106,12 +125,7 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
         f->ellipse_mm[k][0] = d->x_mm;
         f->ellipse_mm[k][1] = d->y_mm;
         f->ellipse_mm[k][2] = d->radius_mm;
-        /* between the kinds, strong and light, places vary too */
-        const eits_real *other = known[k].other_step,
-                        either = pixel * pixel * doubt(known[k].other_rise / excess);
-        f->place_mm2[k][0] = eits_fma(unit, place[0], eits_fma(either * other[0], other[0], least));
-        f->place_mm2[k][1] = eits_fma(unit, place[1], either * other[0] * other[1]);
-        f->place_mm2[k][2] = eits_fma(unit, place[2], eits_fma(either * other[1], other[1], least));
+        report_spread(ctx, s, &known[k], excess, f->place_mm2[k], &f->radius_sd_mm[k]);
     }
 }
 

@@ -4,7 +4,7 @@ _Static_assert(sizeof(eits_packet_info) == 200, "eits_packet_info has padding");
 _Static_assert(sizeof(eits_packet_reply) == 16, "eits_packet_reply has padding");
 _Static_assert(sizeof(eits_packet_raw) == 16, "eits_packet_raw has padding");
 _Static_assert(sizeof(eits_packet_solved) == 104, "eits_packet_solved has padding");
-_Static_assert(sizeof(eits_packet_touch) == 52, "eits_packet_touch has padding");
+_Static_assert(sizeof(eits_packet_touch) == 56, "eits_packet_touch has padding");
 _Static_assert(sizeof(eits_packet_drive_touches) == 20, "eits_packet_drive_touches has padding");
 _Static_assert(sizeof(eits_packet_drive_touch) == 24, "eits_packet_drive_touch has padding");
 _Static_assert(sizeof(eits_packet_events) == 12, "eits_packet_events has padding");

@@ -35,6 +35,8 @@ typedef struct eits_fit {
     eits_real long_mm[EITS_MAX_TOUCHES][2];
     /* the x, y and radius of what has one (evidence/ellipse.c) */
     eits_real ellipse_mm[EITS_MAX_TOUCHES][3];
+    /* of the joint fit: standard deviation of the radius; 0: the data do not tell the radius */
+    eits_real radius_sd_mm[EITS_MAX_TOUCHES];
     /* probability that the disc is one touch (evidence/confidence.c) */
     eits_real confidence[EITS_MAX_TOUCHES];
     const eits_real *data; /* stride: what the discs are to explain */

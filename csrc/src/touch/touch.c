@@ -175,10 +175,11 @@ uint32_t eits_report_touches(const eits_context *ctx, const eits_fit *f, eits_to
             .y_variance_mm2 = f->place_mm2[k][2],
             .long_x_mm = f->tested ? f->long_mm[k][0] : 0,
             .long_y_mm = f->tested ? f->long_mm[k][1] : 0,
+            .radius_sd_mm = f->joint ? f->radius_sd_mm[k] : 0,
         };
         const eits_real numbers[] = {
             touch.x_mm,      touch.y_mm,      touch.radius_mm, touch.strength_s_per_m_mm2,
-            f->explained[k], touch.long_x_mm, touch.long_y_mm};
+            f->explained[k], touch.long_x_mm, touch.long_y_mm, touch.radius_sd_mm};
         /* weights or volts at the ends of the range */
         if (!eits_all_finite(numbers, sizeof numbers / sizeof numbers[0]))
             continue;

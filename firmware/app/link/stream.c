@@ -68,7 +68,8 @@ static void send_solved(fw_host_link *link, const fw_frame *frame, eits_packet_s
                                           .xy_covariance_mm2 = t.xy_covariance_mm2,
                                           .y_variance_mm2 = t.y_variance_mm2,
                                           .long_x_mm = t.long_x_mm,
-                                          .long_y_mm = t.long_y_mm};
+                                          .long_y_mm = t.long_y_mm,
+                                          .radius_sd_mm = t.radius_sd_mm};
         }
         head->count = (uint16_t)count;
         head->age_us = fw_now_us(link->board) - frame->end_us;

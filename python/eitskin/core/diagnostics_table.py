@@ -88,3 +88,7 @@ class Touch:
     # the data do not show a shape
     long_x_mm: float | None = None
     long_y_mm: float | None = None
+    # standard deviation of radius_mm; 0 if the data do not tell the radius. Then radius_mm is the
+    # one expected of touches of this strength, and the change of conductivity, the strength over
+    # the area, is not known either
+    radius_sd_mm: float | None = None

@@ -167,8 +167,10 @@ def known_touch(values: Sequence[Any]) -> Touch:
         whole[first] = None
     if not whole[first + 1]:
         whole[first + 1 :] = [None] * (len(whole) - first - 1)
-    if not any(whole[-2:]):  # no long axis: a disc, as far as the data tell
-        whole[-2:] = [None, None]
+    if not any(whole[-3:-1]):  # no long axis: a disc, as far as the data tell
+        whole[-3:-1] = [None, None]
+    if not whole[-1]:  # the data do not tell the radius
+        whole[-1] = None
     return Touch(*whole)
 
 

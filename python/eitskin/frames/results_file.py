@@ -55,6 +55,7 @@ def save_results(
         "touch_long_mm": np.array(
             [(touch.long_x_mm or 0.0, touch.long_y_mm or 0.0) for _, touch in touches]
         ).reshape(-1, 2),
+        "touch_radius_sd_mm": np.array([touch.radius_sd_mm for _, touch in touches], dtype=float),
         "info": np.array(json.dumps([results[number].info.as_dict() for number in numbers])),
     }
     with write_beside(path) as temporary, temporary.open("wb") as stream:

@@ -15,6 +15,7 @@ from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource
 TOUCH = (
     "id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence",
     "x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2", "long_x_mm", "long_y_mm",
+    "radius_sd_mm",
 )  # fmt: skip
 HEAD = ("frame", "time_s", "time_unix_s")
 DRIVE = (

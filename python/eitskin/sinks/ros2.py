@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Table = dict[str, Any]
 NUMBERS = (
     "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confidence", "long_x_mm",
-    "long_y_mm",
+    "long_y_mm", "radius_sd_mm",
 )  # fmt: skip
 COVARIANCE = ("x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2")
 OK, WARN, ERROR = 0, 1, 2

@@ -105,6 +105,7 @@ def test_light_and_insulating_touches_have_their_radii(kind, median_mm, bias_mm,
     solver.set_options(sign="both")
     distances: list[float] = []
     radii: list[float] = []
+    known: list[float] = []  # errors over the deviation that is reported
     for one in frames(kind):
         solver.tare(one.untouched_v)
         solver.forget()
@@ -112,6 +113,13 @@ def test_light_and_insulating_touches_have_their_radii(kind, median_mm, bias_mm,
         matched = match(one.scene.centres_mm(), [(t.x_mm, t.y_mm) for t in found])
         distances += matched.distances_mm
         radii += [found[j].radius_mm - one.scene.touches[i].radius_mm for i, j in matched.pairs]
+        known += [
+            (found[j].radius_mm - one.scene.touches[i].radius_mm) / sd_mm
+            for i, j in matched.pairs
+            if (sd_mm := found[j].radius_sd_mm) is not None
+        ]
     assert np.median(distances) <= median_mm
     assert abs(np.median(radii)) <= bias_mm
     assert np.median(np.abs(radii)) <= size_mm
+    assert 0 < len(known) < len(radii)  # of others the data do not tell the radius
+    assert np.sqrt(np.mean(np.square(known))) <= 2

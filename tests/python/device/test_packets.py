@@ -193,6 +193,20 @@ def test_a_payload_of_another_length_is_refused(extra):
             pl.parse(kind, payload[:extra] if extra < 0 else payload + bytes(extra))
 
 
+def test_touches_of_a_board_that_does_not_tell_deviations_of_radii_are_read():
+    each = [Touch(k, 1.5, 2.5, 8.0, 3.0, 0.5, radius_sd_mm=0.25) for k in (1, 2)]
+    today = build_touches(pk.SolvedTouches(solved(2), tuple(each)))
+    old = pl.pack(solved(2)) + b"".join(
+        today[start : start + pl.OLDEST_TOUCH_BYTES]
+        for start in range(len(pl.pack(solved(2))), len(today), pl.OLDEST_TOUCH_BYTES + 4)
+    )
+    kind = link.PacketType.TOUCHES
+    older, newer = pl.parse(kind, old), pl.parse(kind, today)
+    assert [touch.id for touch in older.touches] == [touch.id for touch in newer.touches] == [1, 2]
+    assert [touch.radius_mm for touch in older.touches] == [8.0, 8.0]
+    assert [touch.radius_sd_mm for touch in older.touches] == [None, None]
+
+
 @given(words, halves, halves, words)
 def test_a_command_lies_as_its_layout_says(request, what, every, frames):
     command = link.StreamCommand(what, every, frames)

@@ -19,6 +19,7 @@ FIELDS = {
     "touch_frame", "touch_id",
     "touch_xy_mm", "touch_radius_mm", "touch_strength_s_per_m_mm2", "touch_explained",
     "touch_force_n", "touch_confidence", "touch_place_mm2", "touch_long_mm", "info",
+    "touch_radius_sd_mm",
 }  # fmt: skip
 
 
@@ -68,6 +69,8 @@ def test_every_field(tmp_path, results):
     np.testing.assert_array_equal(saved["touch_place_mm2"], np.array(place, dtype=float))
     long_mm = [(t.long_x_mm or 0, t.long_y_mm or 0) for _, t in touches]
     np.testing.assert_array_equal(saved["touch_long_mm"], np.array(long_mm, dtype=float))
+    sd_mm = [touch.radius_sd_mm for _, touch in touches]
+    np.testing.assert_array_equal(saved["touch_radius_sd_mm"], np.array(sd_mm, dtype=float))
     known = [touch.confidence for _, touch in touches]
     np.testing.assert_array_equal(saved["touch_confidence"], np.array(known, dtype=float))
     info = json.loads(str(saved["info"]))

@@ -294,6 +294,7 @@ class TouchPacket(Payload, c="eits_packet_touch"):
     y_variance_mm2: F32
     long_x_mm: F32  # half of the long axis as a vector; 0, 0: a disc, or not known
     long_y_mm: F32
+    radius_sd_mm: F32  # standard deviation of the radius; 0: the data do not tell the radius
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ from eitskin.device.wire.packets import (
 )
 
 OLDEST_INFO_BYTES = 168  # of the first firmware of this link version
+OLDEST_TOUCH_BYTES = 52
 
 
 class MalformedPacket(ValueError):
@@ -156,8 +157,18 @@ def parse_image(payload: bytes) -> SolvedImage:
 
 def parse_touches(payload: bytes) -> SolvedTouches:
     solved, each = unpack(Solved, payload, "TOUCHES", more=True), TouchPacket.LAYOUT
-    _check_rest(payload, solved, each.size * solved.count, "TOUCHES")
-    found = list(each.struct.iter_unpack(payload[solved.LAYOUT.size :]))
+    rest = payload[solved.LAYOUT.size :]
+    if (
+        len(rest) == OLDEST_TOUCH_BYTES * solved.count
+    ):  # of a board that does not tell deviations of radii
+        missing = bytes(each.size - OLDEST_TOUCH_BYTES)
+        rest = b"".join(
+            rest[k : k + OLDEST_TOUCH_BYTES] + missing
+            for k in range(0, len(rest), OLDEST_TOUCH_BYTES)
+        )
+    else:
+        _check_rest(payload, solved, each.size * solved.count, "TOUCHES")
+    found = list(each.struct.iter_unpack(rest))
     if not all(map(isfinite, (value for one in found for value in one))):
         raise MalformedPacket("TOUCHES: a value that is no number")
     return SolvedTouches(solved, tuple(map(known_touch, found)))
