@@ -12,6 +12,7 @@ from eitskin_hardware.spice.bench import Bench
 from eitskin_hardware.spice.measure import Numbers, measure_all
 from eitskin_hardware.spice.promises import table
 from eitskin_hardware.spice.skins import skin_load
+from eitskin_hardware.spice.stages import stage_table
 
 
 class RulesError(EitskinError):
@@ -82,6 +83,11 @@ def make_all(folder: Path) -> Iterator[str]:
         (folder / name).write_text(text, encoding="utf-8")
         yield name
     numbers = measure_all()
-    for name, text in (("results.json", results_text(numbers)), ("promises.md", table(numbers))):
+    simulated = {
+        "results.json": results_text(numbers),
+        "promises.md": table(numbers),
+        "bring-up.md": stage_table(),
+    }
+    for name, text in simulated.items():
         (folder / name).write_text(text, encoding="utf-8")
         yield name

@@ -5,6 +5,7 @@ import subprocess
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -22,6 +23,7 @@ TIMEOUT_S = 120
 BREAK_S = 0.2e-6  # the firmware waits so long between off and on
 Row = tuple[int, int, int, int]  # I+, I-, V+, V-
 PRINTED = re.compile(r"^(\S+) = (\S+?)(?:,(\S+))?$")
+FAILED = re.compile(r"\b[Ee]rror\b|no such vector")
 LINE_PIN = {wire.to: wire.pin for wire in WIRES}
 
 
@@ -192,8 +194,10 @@ def models() -> str:
     return files("eitskin_hardware.spice").joinpath("models.lib").read_text(encoding="utf-8")
 
 
+@lru_cache(maxsize=512)
 def run_ngspice(deck: str) -> str:
-    """Run a deck in batch mode and return what ngspice prints."""
+    """Run a deck in batch mode and return what ngspice prints. The same deck is run once: stages of
+    bring-up share most of theirs."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "deck.cir"
         path.write_text(deck, encoding="utf-8")
@@ -210,7 +214,7 @@ def run_ngspice(deck: str) -> str:
         except subprocess.TimeoutExpired as error:
             raise SpiceError(f"ngspice did not end within {TIMEOUT_S} s") from error
     printed = done.stdout + done.stderr
-    if "rror" in printed or "no such vector" in printed:
+    if FAILED.search(printed):
         raise SpiceError(f"ngspice: {_reason(printed)}")
     return printed
 
@@ -237,5 +241,5 @@ def _print(names: Sequence[str]) -> list[str]:
 
 
 def _reason(printed: str) -> str:
-    bad = [line for line in printed.splitlines() if "rror" in line or "no such" in line]
+    bad = [line for line in printed.splitlines() if FAILED.search(line)]
     return "; ".join(bad[:3]) or printed[-300:]
