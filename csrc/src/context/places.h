@@ -14,8 +14,8 @@ int eits_has_poles(const eits_context *ctx);
  * fields and the row errors that it takes. */
 int eits_may_fit_jointly(const eits_context *ctx);
 
-/* 1 where the reference is so far from the model that its errors matter in the joint fit, else 0: the
- * index of eits_row_errors.moves. */
+/* 1 where the reference is so far from the model that its errors matter in the joint fit, else 0:
+ * the index of eits_row_errors.moves. */
 uint32_t eits_weighs_errors(const eits_context *ctx);
 
 /* at, mm: from where the modelled skin has a touch to where it lies; by at most EITS_MAX_SHIFT. */

@@ -134,6 +134,10 @@ int eits_joint_near(const eits_shape *a, const eits_shape *b, eits_real radii);
 
 /* report.c */
 
+/* Whether frames are fitted jointly: the option is on, the model has what that takes, and the
+ * reference is of a skin that the model describes. */
+int eits_can_fit_jointly(const eits_context *ctx);
+
 /* Before the test: fit the discs of `f` jointly, in *j. Where they explain the frame, each is
  * needed and no two may be one, no test is needed: *f becomes the result, as if tested, and 1 is
  * returned. Else *f stays as it is. Does nothing where the model has no fields, where the option is

@@ -61,10 +61,10 @@ static void inherit(eits_fit *f, uint32_t of, uint32_t k)
     f->confidence[k] = f->confidence[of];
 }
 
-/* What the shapes leave of the data beyond noise. */
+/* What the shapes leave of the data beyond noise and the model's errors. */
 static eits_real left_beyond_noise(const eits_context *ctx, const eits_joint *j)
 {
-    return eits_larger(j->left - eits_joint_freedom(ctx, j), 0);
+    return eits_larger(j->misfit - eits_joint_freedom(ctx, j), 0);
 }
 
 /* p (1 - p), where the other kind has the probability p = 1 / (1 + e^(2 x)), x = rise / 4: that is
@@ -129,12 +129,17 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
     }
 }
 
-/* Whether the fit has what the joint fit takes, and the skin is one that the model describes. */
+int eits_can_fit_jointly(const eits_context *ctx)
+{
+    return ctx->options.touch_test && !ctx->reference.far && eits_may_fit_jointly(ctx) &&
+           ctx->model->uncertainty.errors != NULL;
+}
+
+/* Whether these touches are few enough, and the frame is one that the joint fit takes. */
 static int may_fit(const eits_context *ctx, const eits_fit *f)
 {
     return f->count > 0 && f->count * EITS_JOINT_DISC <= EITS_JOINT_PARAMETERS &&
-           ctx->options.touch_test && !ctx->reference.far && eits_may_fit_jointly(ctx) &&
-           ctx->model->uncertainty.errors != NULL;
+           eits_can_fit_jointly(ctx);
 }
 
 /* Whether the shapes explain the frame. */

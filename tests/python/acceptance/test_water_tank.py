@@ -36,14 +36,20 @@ def folder(shared_data, tmp_path_factory) -> Path:
     build = ["--data", "log-ratio", "--touch-change", "2", "--samples", "0"]
     assert main(["import", source, "-o", str(place / "kit4.npz"), "--skin", skin, *IMPORT]) == 0
     assert main(["model", "build", skin, "-o", str(place / "kit4.eitm"), *build]) == 0
+    build[-1] = "6"  # random skins, from which the model states its own errors
+    assert main(["model", "build", skin, "-o", str(place / "tested.eitm"), *build]) == 0
     return place
 
 
 def reconstructed(
-    folder: Path, frames: str, capsys: pytest.CaptureFixture[str], *options: str
+    folder: Path,
+    frames: str,
+    capsys: pytest.CaptureFixture[str],
+    *options: str,
+    model: str = "kit4.eitm",
 ) -> dict[str, Any]:
     capsys.readouterr()
-    model = str(folder / "kit4.eitm")
+    model = str(folder / model)
     assert main(["reconstruct", str(folder / frames), "--model", model, "--json", *options]) == 0
     facts: dict[str, Any] = json.loads(capsys.readouterr().out)
     return facts
@@ -58,6 +64,18 @@ def test_every_metal_object_is_found_and_nothing_else(folder, capsys):
     assert summary["position_worst_mm"] <= 0.03 * DIAMETER_MM
     assert summary["miou_touches"] >= 0.84
     assert min(frame["miou_touches"] for frame in facts["frames"]) >= 0.80
+
+
+@pytest.mark.parametrize("model", ["kit4.eitm", "tested.eitm"])
+def test_the_touches_show_every_frame_and_better_than_the_solver(folder, capsys, model):
+    """On log-ratio data touches are not fitted jointly and leave 2 to 11 % of the data, also with a
+    model that states its errors. Its image had an MIoU of .65 when the guard asked for 2 %."""
+    facts = reconstructed(folder, "kit4.npz", capsys, "--only", ",".join(TOUCH_LIKE), model=model)
+    assert {frame["image_is"] for frame in facts["frames"]} == {"touches"}
+    summary = facts["summary"]
+    assert (summary["found"], summary["false"]) == (8, 0)
+    assert summary["miou_image"] >= 0.85
+    assert summary["miou_image"] >= summary["miou_solver"] + 0.1
 
 
 def test_the_oracle_finds_most_metal_objects_and_nothing_else(folder, capsys):
