@@ -11,10 +11,10 @@ from eitskin.oracle.round_skin import RoundSkin
 from eitskin.scene.random_touches import TouchScene, TrueTouch
 from eitskin.skin.protocol import adjacent, pattern
 from eitskin.skin.skin import paper_skin
+from eitskin_studies.benchmarks.limit_bound import bounds_of, touch_slopes_v
 from eitskin_studies.experiments import patterns
 from eitskin_studies.experiments.experiment import ExperimentOutcome
 from eitskin_studies.experiments.patterns import measuring, noise
-from eitskin_studies.experiments.patterns.bound import place_bounds_mm, slopes_v
 from study_pages import coarse, fills_its_page, goes_on
 
 
@@ -25,10 +25,10 @@ def disk() -> RoundSkin:
 
 def test_the_bound_falls_with_the_noise_and_has_no_prior_of_the_place(disk):
     scene = TouchScene("one", (TrueTouch(30.0, 10.0, 9.0, 5.0),))
-    slopes = slopes_v(disk, scene)
-    noisy, quiet = (place_bounds_mm(slopes, np.full(208, sigma))[0] for sigma in (4e-4, 1e-4))
+    slopes = touch_slopes_v(disk, scene.touches)
+    noisy, quiet = (bounds_of(slopes / sigma, scene.touches)[0].median_mm for sigma in (4e-4, 1e-4))
     assert 3.5 < noisy / quiet <= 4.2
-    assert place_bounds_mm(1e-6 * slopes, np.full(208, 1e-4))[0] > 1e3
+    assert bounds_of(1e-2 * slopes, scene.touches)[0].median_mm > 1e3
 
 
 def test_each_noise_of_rows():

@@ -65,8 +65,7 @@ static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fi
 static eits_shown shown(const eits_context *ctx, const eits_fit *f, uint32_t found,
                         const eits_touch *reported, uint32_t count)
 {
-    const eits_real most =
-        eits_can_fit_jointly(ctx) ? EITS_SHOWN_UNEXPLAINED : EITS_SHOWN_UNTESTED;
+    const eits_real most = eits_can_fit_jointly(ctx) ? EITS_SHOWN_UNEXPLAINED : EITS_SHOWN_UNTESTED;
     uint32_t drawn = 0;
     for (uint32_t k = 0; k < count; ++k)
         drawn += reported[k].explained > 0;

@@ -30,7 +30,7 @@ from eitskin_studies.experiments.electrodes.patterns import from_transfer, trans
 STEPS = (0.05, 0.05, 0.003, 0.005, 0.01, 0.01)  # x and y in mm, log radius, q, e1, e2
 CONTACT_STEP = 0.05
 # The deviations that the core's joint fit assumes (tables/constants.toml, module "joint").
-LOG_RADIUS_SD, AMPLITUDE_SD, SHAPE_SD = 0.35, 0.17, 0.15
+LOG_RADIUS_SD, AMPLITUDE_SD, SHAPE_SD = 0.3, 0.17, 0.15
 NORMALS = np.random.default_rng(0).standard_normal((4000, 2))
 
 
@@ -88,10 +88,6 @@ def exact_scene(
     protocol = transfer(skin.electrodes.count)
     model = RoundSkin(skin, protocol, contact_ohm_m2)
     both = np.array([model.voltages(()), model.voltages(touches)])
-    slopes = [
-        (model.voltages(ahead) - model.voltages(back)) / (2 * step)
-        for ahead, back, step in _neighbours(touches)
-    ]
     contacts = []
     for k in range(len(contact_ohm_m2)):
         changed = contact_ohm_m2.copy()
@@ -102,9 +98,19 @@ def exact_scene(
         touches,
         both[0],
         both[1],
-        np.array(slopes),
+        touch_slopes_v(model, touches),
         np.array(contacts).transpose(1, 0, 2) / CONTACT_STEP,
     )
+
+
+def touch_slopes_v(model: RoundSkin, touches: Sequence[TrueTouch]) -> FloatArray:
+    """Return the derivatives (p, m) of the voltages by all parameters of one touch after the other,
+    by central differences."""
+    slopes = [
+        (model.voltages(ahead) - model.voltages(back)) / (2 * step)
+        for ahead, back, step in _neighbours(touches)
+    ]
+    return np.array(slopes)
 
 
 def bounds(
@@ -121,10 +127,23 @@ def bounds(
     tare, frame = from_transfer(scene.contact_slopes_v, protocol) / sigma_v
     tare = tare * np.sqrt(tare_frames)
     slopes = np.block([[touch_rows, np.zeros_like(touch_rows)], [frame, tare]])
-    sizes = [_parameter_count(touch) for touch in scene.touches]
+    return bounds_of(slopes, scene.touches, amplitude_sd, [contact_sd] * len(tare))
+
+
+def bounds_of(
+    slopes: FloatArray,
+    touches: Sequence[TrueTouch],
+    amplitude_sd: float = AMPLITUDE_SD,
+    nuisance_sd: Sequence[float] = (),
+) -> list[Bound]:
+    """Return the bound of each touch from data whose noise has the deviation 1: ``slopes`` (p, m)
+    are theirs by the parameters of the touches, then by nuisances whose priors have the deviations
+    ``nuisance_sd``."""
+    sizes = [_parameter_count(touch) for touch in touches]
     own = (np.inf, np.inf, LOG_RADIUS_SD, amplitude_sd, SHAPE_SD, SHAPE_SD)
-    prior_sd = [*(sd for size in sizes for sd in own[:size]), *[contact_sd] * len(tare)]
-    covariance = np.linalg.inv(slopes @ slopes.T + np.diag(np.array(prior_sd) ** -2.0))
+    prior_sd = [*(sd for size in sizes for sd in own[:size]), *nuisance_sd]
+    information = slopes @ slopes.T + np.diag(np.array(prior_sd) ** -2.0)
+    covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
     starts = np.cumsum([0, *sizes[:-1]])
     return [
         Bound(covariance[k : k + 2, k : k + 2], float(np.sqrt(covariance[k + 2, k + 2])))

@@ -73,7 +73,7 @@ def _conditions(result: LimitResult) -> str:
         " The SNR refers to the rms of the untouched frame. Found touches are paired with true ones"
         " within 10 mm; *exact* scenes have no touch without a partner. Errors and bounds are those"
         " of the same touches, those with a partner. The bound knows the model, the tare and the"
-        " noise with the converter's steps; its priors have the deviations .35 of the radius's"
+        " noise with the converter's steps; its priors have the deviations .3 of the radius's"
         " logarithm, .17 of the amplitude (.28 for insulating touches), .15 of each component of"
         f" the shape and .12 of each contact's logarithm. Commit {result.commit}."
     )

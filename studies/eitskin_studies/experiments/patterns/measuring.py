@@ -24,10 +24,10 @@ from eitskin.scene.streams import stream
 from eitskin.scoring import metrics
 from eitskin.skin.protocol import Protocol, independent_rows, pattern
 from eitskin.skin.skin import Skin, paper_skin
+from eitskin_studies.benchmarks.limit_bound import bounds_of, touch_slopes_v
 from eitskin_studies.experiments.electrodes.patterns import from_transfer, transfer
 from eitskin_studies.experiments.electrodes.tuning import tuned
 from eitskin_studies.experiments.experiment import MODEL_ELEMENTS, Workspace
-from eitskin_studies.experiments.patterns.bound import place_bounds_mm, slopes_v
 from eitskin_studies.experiments.patterns.noise import HEADROOM, NOISES, Rows, row_gain, rows_of
 from eitskin_studies.experiments.scored import session_in_parts
 from eitskin_studies.harness.sessions import FrameSession
@@ -111,15 +111,17 @@ class PatternNoise:
                 noise: {name: [] for name in PATTERNS} for noise in NOISES
             }
             for scene in self.workspace.progress(drawn.scenes, "bounds"):
-                slopes = slopes_v(self._exact, scene)
+                slopes = touch_slopes_v(self._exact, scene.touches)
                 for name, protocol in self.protocols.items():
                     rows = from_transfer(slopes, protocol)
                     for noise in NOISES:
                         sigma_v = self.noise_v(name, noise)
-                        found[noise][name] += place_bounds_mm(rows, sigma_v)
+                        found[noise][name] += [
+                            one.median_mm for one in bounds_of(rows / sigma_v, scene.touches)
+                        ]
             return found
 
-        facts = {"patterns": "bounds of rows", "scenes": len(drawn.scenes), "noises": list(NOISES)}
+        facts = {"patterns": "bounds of rows by log radius", "scenes": len(drawn.scenes), "noises": list(NOISES)}
         kept: Mapping[str, Mapping[str, list[float]]] = self.workspace.kept(facts, make)
         return kept
 
