@@ -1,18 +1,24 @@
 """Writes the files of ``hardware/made``."""
 
 import json
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from eitskin.errors import EitskinError, UsageError
+from eitskin.skin.skin import load_skin, paper_skin
 from eitskin_hardware.circuit.instrument import instrument
 from eitskin_hardware.circuit.lists import parts_csv, parts_page, wiring_page
 from eitskin_hardware.circuit.netlist import Checked, check
+from eitskin_hardware.container.container import container_of, make_stl, triangles, write_scad
+from eitskin_hardware.container.drawing import draw_measures, draw_picture, draw_wires
 from eitskin_hardware.spice.bench import Bench
 from eitskin_hardware.spice.measure import Numbers, measure_all
 from eitskin_hardware.spice.promises import table
 from eitskin_hardware.spice.skins import skin_load
 from eitskin_hardware.spice.stages import stage_table
+
+RECTANGLE = Path(__file__).resolve().parent / "container" / "rectangle.toml"  # an example
 
 
 class RulesError(EitskinError):
@@ -82,6 +88,7 @@ def make_all(folder: Path) -> Iterator[str]:
     for name, text in texts().items():
         (folder / name).write_text(text, encoding="utf-8")
         yield name
+    yield from draw_containers(folder)
     numbers = measure_all()
     simulated = {
         "results.json": results_text(numbers),
@@ -91,3 +98,20 @@ def make_all(folder: Path) -> Iterator[str]:
     for name, text in simulated.items():
         (folder / name).write_text(text, encoding="utf-8")
         yield name
+
+
+def draw_containers(folder: Path) -> Iterator[str]:
+    """Draw the paper's dish and a rectangular one, and a picture of the paper's with its posts."""
+    (folder / "container").mkdir(exist_ok=True)
+    round_one = container_of(paper_skin())
+    rectangle = container_of(load_skin(RECTANGLE)[0])
+    for name, container in (("paper", round_one), ("rectangle", rectangle)):
+        draw_measures(container, folder / f"container/{name}.svg")
+        yield f"container/{name}.svg"
+    draw_wires(round_one, folder / "container/wires.svg")
+    yield "container/wires.svg"
+    with tempfile.TemporaryDirectory() as made:
+        write_scad(round_one, Path(made))
+        faces = triangles(make_stl(Path(made), "all"))
+    draw_picture(faces, folder / "container/paper.png", "the paper's dish with its posts")
+    yield "container/paper.png"
