@@ -122,6 +122,7 @@ EXTRAS = {  # the packages of each extra, and the module by which each is found
     "mqtt": {"paho-mqtt": "paho"},
     "lsl": {"pylsl": "pylsl"},
     "mcap": {"mcap-ros2-support": "mcap_ros2"},
+    "ros2": {"cyclonedds": "cyclonedds"},
     "foxglove": {"foxglove-sdk": "foxglove"},
 }
 

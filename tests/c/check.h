@@ -87,18 +87,29 @@ static inline int checks_report(const char *name)
 
 enum { MAX_TESTS = 64 };
 static struct {
+    int line;
     const char *name;
     void (*run)(void);
 } checks_tests[MAX_TESTS];
 static int checks_tests_known = 0;
+
+/* Put a test in its place by line: constructors run in an order that the system chooses. */
+static inline void check_known(int line, const char *name, void (*run)(void))
+{
+    int at = checks_tests_known++;
+    for (; at > 0 && checks_tests[at - 1].line > line; --at)
+        checks_tests[at] = checks_tests[at - 1];
+    checks_tests[at].line = line;
+    checks_tests[at].name = name;
+    checks_tests[at].run = run;
+}
 
 /* A test: the body follows. It puts itself on the list before main. */
 #define TEST(body)                                              \
     static void body(void);                                     \
     __attribute__((constructor)) static void body##_known(void) \
     {                                                           \
-        checks_tests[checks_tests_known].name = #body;          \
-        checks_tests[checks_tests_known++].run = body;          \
+        check_known(__LINE__, #body, body);                     \
     }                                                           \
     static void body(void)
 

@@ -26,6 +26,7 @@ extern const eits_kernels eits_kernels_m7;
 const eits_kernels *eits_kernels_best(void)
 {
 #ifdef EITS_BUILD_AVX2
+    __builtin_cpu_init(); /* not every compiler's library does so by itself */
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && SUPPORTS_F16C)
         return &eits_kernels_avx2;
 #endif

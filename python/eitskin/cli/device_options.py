@@ -176,7 +176,7 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
         "--to URL",
         "also send touches to URL; can be repeated: udp://HOST:PORT, ws://HOST:PORT (clients"
         " connect to it), osc://HOST:PORT, tuio://HOST, mqtt://HOST, lsl:, csv:FILE, mcap:FILE,"
-        " foxglove:, or a sink of another package (docs/guide/touches-out.md)",
+        " ros2:, foxglove:, or a sink of another package (docs/guide/touches-out.md)",
         action="append",
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from eitskin.errors import SinkError, missing_extra
 from eitskin.session.message import schema
-from eitskin.sinks.mcap_file import frame_id, topics_of
+from eitskin.sinks.ros2_topics import frame_id, topics_of
 from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
 
 USAGE = "foxglove: or foxglove://HOST:PORT"

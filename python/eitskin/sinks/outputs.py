@@ -136,7 +136,7 @@ def attached_outputs(
     model = None if session.known is None else session.known.model
     board = session.device.board.board
     url, name = session.device.transport.url, session.given_name
-    source = TouchSource(url, board, model, overwrite, name, session.source)
+    source = TouchSource(url, board, model, overwrite, name, session.source, session.tare)
     with Outputs(urls, source, patient=session.patient, say=say) as outputs:
         session.consumers.append(outputs.put)
         yield outputs

@@ -58,14 +58,15 @@ def definitions() -> dict[str, str]:
     report = folder.joinpath("Report.msg").read_text("utf-8")
     diagnostic = {"diagnostic_msgs/DiagnosticStatus": STATUS, "diagnostic_msgs/KeyValue": KEY_VALUE}
     return {
-        "eitskin_msgs/msg/TouchArray": _whole(array, {"eitskin_msgs/Touch": touch}),
-        "eitskin_msgs/msg/Report": _whole(report, {"eitskin_msgs/MovingTouch": moving}),
-        "sensor_msgs/msg/Image": _whole(IMAGE, {}),
-        "diagnostic_msgs/msg/DiagnosticArray": _whole(DIAGNOSTICS, diagnostic),
+        "eitskin_msgs/msg/TouchArray": whole(array, {"eitskin_msgs/Touch": touch}),
+        "eitskin_msgs/msg/Report": whole(report, {"eitskin_msgs/MovingTouch": moving}),
+        "sensor_msgs/msg/Image": whole(IMAGE, {}),
+        "diagnostic_msgs/msg/DiagnosticArray": whole(DIAGNOSTICS, diagnostic),
     }
 
 
-def _whole(first: str, others: dict[str, str]) -> str:
+def whole(first: str, others: dict[str, str]) -> str:
+    """Return the definition ``first`` with those of ``others`` and of headers behind it."""
     parts = [f"{'=' * 80}\nMSG: {name}\n{text}" for name, text in (others | COMMON).items()]
     return "".join((first, *parts))
 

@@ -2,6 +2,8 @@
 
 import math
 import re
+from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -26,7 +28,8 @@ class Dropped(Exception):
 class TouchSource:
     """The origin of touches: the device's URL, its board, and its model if the host has it.
     ``overwrite`` allows overwriting existing files. ``name`` is the source's name as given, None
-    where none was, and ``source`` the one in messages, which is then the board's serial number."""
+    where none was, and ``source`` the one in messages, which is then the board's serial number.
+    ``tare`` takes the reference again, from any thread; None where there is no board."""
 
     url: str
     board: str = ""
@@ -34,6 +37,7 @@ class TouchSource:
     overwrite: bool = False
     name: str | None = None
     source: str | None = None
+    tare: Callable[[], "Future[None]"] | None = None
 
     @property
     def box_mm(self) -> Box | None:

@@ -63,7 +63,11 @@ def mcap_messages(path: Path) -> list[tuple[str, str]]:
 
     with path.open("rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-        return [(c.topic, m.header.frame_id) for _, c, _, m in reader.iter_decoded_messages()]
+        heads = (
+            (c.topic, m.markers[0].header if hasattr(m, "markers") else m.header)
+            for _, c, _, m in reader.iter_decoded_messages()
+        )
+        return [(topic, head.frame_id) for topic, head in heads]
 
 
 @pytest.fixture

@@ -97,4 +97,4 @@ def test_messages_take_what_the_conversion_sets(swipe, drives):
 def test_the_workspace_has_the_messages_that_ship():
     shipped = {path.name: path.read_text() for path in ROOT.glob("python/eitskin/sinks/msg/*.msg")}
     built = {path.name: path.read_text() for path in NODE.glob("eitskin_msgs/msg/*.msg")}
-    assert shipped == built and len(built) == 4
+    assert shipped == built and len(built) == 6

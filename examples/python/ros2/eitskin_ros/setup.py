@@ -7,6 +7,8 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/eitskin_ros"]),
         ("share/eitskin_ros", ["package.xml"]),
+        ("share/eitskin_ros/launch", ["launch/skin.launch.py"]),
+        ("share/eitskin_ros/urdf", ["urdf/skin.urdf"]),
     ],
     install_requires=["setuptools", "eitskin"],
     entry_points={"console_scripts": ["skin = eitskin_ros.skin:main"]},

@@ -1,0 +1,174 @@
+"""Say which ROS 2 messages a frame, a drive's touches or a notice become, and on which topics:
+``mcap:`` records them and ``ros2:`` publishes them.
+
+Messages that a robot reads are in metres and by REP 103 and 105: contacts, poses and markers have
+the skin's own frame, with x to the right and y up as the skin is seen from above, and z out of it.
+"""
+
+import math
+from collections.abc import Iterator
+from importlib.resources import files
+from typing import Any
+
+from eitskin.sinks import ros2
+from eitskin.sinks.sink import OutgoingMessage, TouchSource, or_nan
+
+Topic = tuple[str, str, ros2.Table]  # its name, the type of its messages, a message
+CONTACTS, POSES = "eitskin_msgs/msg/ContactArray", "geometry_msgs/msg/PoseArray"
+MARKERS = "visualization_msgs/msg/MarkerArray"
+CYLINDER, DELETE_ALL = 3, 3
+HEIGHT_M = 0.002  # of a marker
+LIFETIME_NS = 500_000_000  # of markers, after which a stream that ended shows nothing
+COLOUR = (0.9, 0.35, 0.1)
+
+
+def frame_id(source: TouchSource) -> str:
+    """The frame of reference in ROS: the source's name, or skin."""
+    return source.name or "skin"
+
+
+def topics_of(source: TouchSource) -> str:
+    """What topics begin with: the source's name, if it has one."""
+    return "" if source.name is None else f"/{source.name}"
+
+
+def definitions() -> dict[str, str]:
+    """Return the definition of each message type together with the types it uses, in the format of
+    ros2msg files."""
+    folder = files("eitskin.sinks").joinpath("msg")
+
+    def text(name: str) -> str:
+        return folder.joinpath(name).read_text("utf-8")
+
+    return ros2.definitions() | {
+        CONTACTS: ros2.whole(
+            text("ContactArray.msg"), {"eitskin_msgs/Contact": text("Contact.msg")}
+        ),
+        POSES: text("PoseArray.msgdef"),
+        MARKERS: text("MarkerArray.msgdef"),
+    }
+
+
+class RosTopics:
+    """The messages of one source. Diagnostics are repeated only when they change."""
+
+    def __init__(self, source: TouchSource) -> None:
+        self._source, self._frame_id, self._prefix = source, frame_id(source), topics_of(source)
+        self._status: Any = None
+
+    def of(self, outgoing: OutgoingMessage) -> Iterator[Topic]:
+        for name, kind, table in self._plain(outgoing):
+            yield self._prefix + name, kind, table
+
+    def _plain(self, outgoing: OutgoingMessage) -> Iterator[Topic]:
+        message, now, at = outgoing.message, outgoing.time_ns, self._frame_id
+        if message["type"] == "summary":
+            return
+        if outgoing.report is not None:
+            yield "/reports", "eitskin_msgs/msg/Report", ros2.report(message, now, at)
+            yield "/contacts", CONTACTS, contacts(message, now, at)
+            return
+        if outgoing.frame is not None:
+            yield "/touches", "eitskin_msgs/msg/TouchArray", ros2.touch_array(message, now, at)
+            yield "/contacts", CONTACTS, contacts(message, now, at)
+            yield "/poses", POSES, poses(message, now, at)
+            yield "/markers", MARKERS, markers(message, now, at)
+            model = self._source.model
+            if outgoing.frame.image is not None and model is not None:
+                table = ros2.image(model.grid, outgoing.frame.image, now, at)
+                yield "/image", "sensor_msgs/msg/Image", table
+        table = ros2.diagnostics(message, now, at, self._source.board)
+        if table["status"] != self._status or outgoing.notice is not None:
+            yield "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", table
+            self._status = table["status"]
+
+
+def contacts(message: ros2.Table, time_ns: int, frame: str) -> ros2.Table:
+    """Return the eitskin_msgs/ContactArray of a frame or a drive, whose touches have neither radius
+    nor force."""
+    return {
+        "header": ros2.header(time_ns, frame),
+        "contacts": [_contact(touch) for touch in message["touches"] or []],
+    }
+
+
+def _contact(touch: ros2.Table) -> ros2.Table:
+    def known(name: str, factor: float = 1.0) -> float:
+        return or_nan(touch.get(name)) * factor
+
+    mm, mm2 = 1e-3, 1e-6
+    return {
+        "id": touch["id"],
+        "x": known("x_mm", mm),
+        "y": known("y_mm", mm),
+        "vx": known("vx_mm_per_s", mm),
+        "vy": known("vy_mm_per_s", mm),
+        "radius": known("radius_mm", mm),
+        "force": known("force_n"),
+        "confidence": known("confidence"),
+        "covariance": [known(name, mm2) for name in ros2.COVARIANCE],
+    }
+
+
+def poses(message: ros2.Table, time_ns: int, frame: str) -> ros2.Table:
+    """Return the geometry_msgs/PoseArray of a frame: the centre of each touch, z out of the
+    skin."""
+    found = [_pose(touch, 0.0) for touch in message["touches"] or []]
+    return {"header": ros2.header(time_ns, frame), "poses": found}
+
+
+def _pose(touch: ros2.Table, turn_rad: float) -> ros2.Table:
+    half = turn_rad / 2
+    return {
+        "position": {"x": touch["x_mm"] / 1e3, "y": touch["y_mm"] / 1e3, "z": 0.0},
+        "orientation": {"x": 0.0, "y": 0.0, "z": math.sin(half), "w": math.cos(half)},
+    }
+
+
+def markers(message: ros2.Table, time_ns: int, frame: str) -> ros2.Table:
+    """Return the visualization_msgs/MarkerArray of a frame: a flat cylinder per touch, in place of
+    those of the frame before. An ellipse has its long axis along the marker's x."""
+    head = ros2.header(time_ns, frame)
+    found = [_marker(head, DELETE_ALL, 0, _pose({"x_mm": 0.0, "y_mm": 0.0}, 0.0), (1.0, 1.0), 0.0)]
+    for touch in message["touches"] or []:
+        radius = touch["radius_mm"] / 1e3
+        along = math.hypot(touch["long_x_mm"] or 0.0, touch["long_y_mm"] or 0.0) / 1e3
+        turn, size = 0.0, (radius, radius)
+        if along > 0:  # the ellipse has the area pi radius^2
+            turn = math.atan2(touch["long_y_mm"], touch["long_x_mm"])
+            size = (along, radius**2 / along)
+        alpha = 0.9 if touch["confidence"] is None else max(0.3, touch["confidence"])
+        found.append(_marker(head, 0, touch["id"], _pose(touch, turn), size, alpha))
+    return {"markers": found}
+
+
+def _marker(
+    head: ros2.Table,
+    action: int,
+    number: int,
+    pose: ros2.Table,
+    half_m: tuple[float, float],
+    alpha: float,
+) -> ros2.Table:
+    red, green, blue = COLOUR
+    return {
+        "header": head,
+        "ns": "touches",
+        "id": number % 2**31,
+        "type": CYLINDER,
+        "action": action,
+        "pose": pose,
+        "scale": {"x": 2 * half_m[0], "y": 2 * half_m[1], "z": HEIGHT_M},
+        "color": {"r": red, "g": green, "b": blue, "a": alpha},
+        "lifetime": {"sec": 0, "nanosec": LIFETIME_NS},
+        "frame_locked": True,
+        "points": [],
+        "colors": [],
+        "texture_resource": "",
+        "texture": {"header": head, "format": "", "data": []},
+        "uv_coordinates": [],
+        "text": "",
+        "mesh_resource": "",
+        "mesh_file": {"filename": "", "data": []},
+        "mesh_use_embedded_materials": False,
+    }
