@@ -121,7 +121,11 @@ class PatternNoise:
                         ]
             return found
 
-        facts = {"patterns": "bounds of rows by log radius", "scenes": len(drawn.scenes), "noises": list(NOISES)}
+        facts = {
+            "patterns": "bounds of rows by log radius",
+            "scenes": len(drawn.scenes),
+            "noises": list(NOISES),
+        }
         kept: Mapping[str, Mapping[str, list[float]]] = self.workspace.kept(facts, make)
         return kept
 
