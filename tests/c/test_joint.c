@@ -186,7 +186,7 @@ TEST(touches_that_conduct_less_come_back)
     fit_jointly(ctx, &f);
     CHECK(f.disc[0].change > 0 && f.disc[1].change < 0);
     for (uint32_t k = 0; k < 2; ++k)
-        CHECK_NEAR(place_error(&f, two, k), 0, 0.25);
+        CHECK_NEAR(place_error(&f, two, k), 0, 0.35); /* of unlike kinds, radii are known less */
 }
 
 /* Half of the long axis is r ((1 + eta) / (1 - eta))^1/2 along half the angle of (e1, e2). */
@@ -277,7 +277,7 @@ static double dense_product(const eits_context *ctx, double variance, double err
 }
 
 /* The products that the fit makes of weighed columns are those of the inverse covariance; vectors
- * of errors far below the noise are left out, and all of them on a skin that is near the model. */
+ * of errors far below the noise are left out, and all of them on a skin that is the model's. */
 TEST(products_are_those_of_the_inverse_covariance)
 {
     static const double distances[] = {0, 0.05, 0.09, 0.18, 0.5};
@@ -287,7 +287,7 @@ TEST(products_are_those_of_the_inverse_covariance)
         ctx->reference.distance = (eits_real)distances[k];
         const eits_joint_memory *m = &ctx->joint;
         (void)eits_joint_metric(ctx);
-        CHECK_EQUAL(m->errors > 0, distances[k] > 0.33 * 0.18);
+        CHECK_EQUAL(m->errors > 0, distances[k] > 0);
         const double weight = (double)m->weight[0], variance = 1 / (weight * weight);
         eits_real columns[2][SMALL_FOLDED], along[2][EITS_JOINT_NUISANCES] = {{0}};
         const eits_real part = R(0.2);
