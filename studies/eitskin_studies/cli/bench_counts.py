@@ -214,3 +214,33 @@ def run_limit(options: argparse.Namespace) -> int:
             command += f" --{name} {getattr(options, name)}"
     filling = limit_page.for_page(result, command)
     return show(options, result, limit_page.as_text(result), filling, "limit")
+
+
+def add_peers(what: Any) -> None:
+    """``bench peers``."""
+    parser = what.add_parser(
+        "peers",
+        help="what numpy, scikit-learn, pyEIT and the core do with spoilt frames",
+        description=(
+            "Spoil the frames of random scenes in eleven ways, and say what each program answers:"
+            " the right image, a worse one, a name for the fault, NaN or an error."
+        ),
+    )
+    option(parser, "--scenes", "that every fault is put on", default=20)
+    option(parser, "--seed", "of scenes and noise", default=1)
+    add_page_option(parser, "peers")
+    parser.set_defaults(run=run_peers)
+
+
+def run_peers(options: argparse.Namespace) -> int:
+    """Let other programs and the core meet spoilt frames."""
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import peers
+
+    check_within("--scenes", options.scenes, 1, 10_000)
+    check_within("--seed", options.seed, 0, 2**31 - 1)
+    refuse_unwritable(options.page)
+    result = peers.run(options.scenes, options.seed, progress_bar)
+    command = f"eitskin bench peers --scenes {options.scenes} --seed {options.seed}"
+    filling = peers.for_page(result, f"{command} --page studies/results/peers.md")
+    return show(options, result, peers.as_text(result), filling, "peers")

@@ -29,3 +29,4 @@ def add_parser(subparsers: Any) -> None:
     bench_counts.add_gestures(what)
     bench_counts.add_worlds(what)
     bench_counts.add_limit(what)
+    bench_counts.add_peers(what)

@@ -27,7 +27,8 @@ give the same bits. Where float64 was measured, it stands beside them.
 [margins.json](../../tests/python/hard_cases/margins.json) with what was measured. *Used* is the
 share of the bound that the worst measurement took: 0 % is perfect, 100 % is at the bound, and a
 test fails above it. Hardly any bound is statistical; seeds are in the tests. Cases without a number
-are right or wrong, such as a file that is refused.
+are right or wrong, such as a file that is refused. [Peers](peers.md) shows what other programs do
+in some of these cases.
 
 {groups}
 """
