@@ -12,6 +12,7 @@ from eitskin_hardware.circuit.lists import parts_csv, parts_page, wiring_page
 from eitskin_hardware.circuit.netlist import Checked, check
 from eitskin_hardware.container.container import container_of, make_stl, triangles, write_scad
 from eitskin_hardware.container.drawing import draw_measures, draw_picture, draw_wires
+from eitskin_hardware.schematic.write import write_schematic
 from eitskin_hardware.spice.bench import Bench
 from eitskin_hardware.spice.measure import Numbers, measure_all
 from eitskin_hardware.spice.promises import table
@@ -88,6 +89,8 @@ def make_all(folder: Path) -> Iterator[str]:
     for name, text in texts().items():
         (folder / name).write_text(text, encoding="utf-8")
         yield name
+    for name in write_schematic(instrument(), folder / "schematic"):
+        yield f"schematic/{name}"
     yield from draw_containers(folder)
     numbers = measure_all()
     simulated = {

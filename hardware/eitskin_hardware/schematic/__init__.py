@@ -1,0 +1,1 @@
+"""The schematic, drawn from the design by stage."""
