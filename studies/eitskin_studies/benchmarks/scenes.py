@@ -7,6 +7,9 @@ of its own, once, before timing. The dataset's scenes are drawn, solved, measure
 """
 
 import statistics
+import subprocess
+import sys
+import tracemalloc
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import perf_counter
@@ -26,6 +29,7 @@ from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin_studies.datasets.dataset import Job, job_of, make_chunk
 from eitskin_studies.datasets.ranges import drawn
 from eitskin_studies.harness.machine import machine
+from eitskin_studies.harness.sections import Filling, Tabular
 
 PROJECTED = 10_000
 DEFAULTS: dict[str, dict[str, Any]] = {
@@ -79,10 +83,81 @@ def effects_table(
                 "compile_s": middle - start,
             }
     none = statistics.median(times["none"])
+    bare = imported_by([])
     for name, row in rows.items():
         median = statistics.median(times[name])
-        row |= {"total_s": median, "least_s": min(times[name]), "ratio": median / none}
+        more = imported_by(sorted(cases[name]))
+        row |= {
+            "total_s": median,
+            "least_s": min(times[name]),
+            "ratio": median / none,
+            "peak_mb": _peak_mb(replace(base, effects=cases[name]), workspace),
+            "modules": len(more - bare),
+        }
     return {"machine": machine(), "frames": base.n_frames, "rounds": rounds, "cases": rows}
+
+
+def imported_by(effects: Sequence[str]) -> set[str]:
+    """Return the modules that a process has loaded after it ran a small scene with ``effects`` at
+    their defaults."""
+    probe = """
+import sys
+from pathlib import Path
+from eitskin.scene.description import scene_from_table
+from eitskin.scene.runner import run_scene
+head = {"name": "probe", "frames": 2, "quiet_frames": 1, "elements": 400}
+touch = {"radius_mm": 10.0, "x_mm": 0.0, "y_mm": 0.0}
+effects = {name: {} for name in sys.argv[1:]}
+if "noise" in effects:
+    effects["noise"] = {"snr_db": 60.0}
+table = {"scene": head, "touch": [touch], "effects": effects}
+run_scene(scene_from_table(table, "probe", Path()))
+print("\\n".join(sys.modules))
+"""
+    command = [sys.executable, "-c", probe, *effects]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def _peak_mb(scene: Scene, workspace: MeshCache) -> float:
+    """Return the most memory that Python holds while the scene is compiled and run, in MB, without
+    what was there before."""
+    tracemalloc.start()
+    simulate_frames(compile_scene(scene, mesh_cache=workspace))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak / 1e6
+
+
+def effects_cells(result: dict[str, Any]) -> Tabular:
+    """The table of a page."""
+    head = ("effects", "time, of that without", "ms", "factorisations", "solves", "random numbers",
+            "memory, MB", "more modules")  # fmt: skip
+    rows = [
+        (
+            name.replace("_", " "),
+            f"{row['ratio']:.2f}",
+            f"{1e3 * row['total_s']:.0f}",
+            str(row["factorisations"]),
+            str(row["solves"]),
+            f"{row['random_numbers']:.0f}",
+            f"{row['peak_mb']:.1f}",
+            str(row["modules"]),
+        )
+        for name, row in result["cases"].items()
+    ]
+    return head, rows
+
+
+def effects_filling(result: dict[str, Any], command: str) -> Filling:
+    """What ``--page`` writes."""
+    conditions = (
+        f"A touch crosses the skin in {result['frames']} frames, on about 3,000 elements; effects"
+        f" have their defaults. Median of {result['rounds']} interleaved rounds, compile and run,"
+        f" without meshing; {result['machine']}."
+    )
+    texts = {"conditions": conditions, "command": f"Made by `{command}`."}
+    return texts, {"effects": effects_cells(result)}
 
 
 def effects_text(result: dict[str, Any]) -> str:
@@ -96,14 +171,14 @@ def effects_text(result: dict[str, Any]) -> str:
         "",
         (
             f"{'effects':<18} {'ms':>8} {'ratio':>7} {'steps':>6} {'factorisations':>15}"
-            f" {'solves':>7} {'random':>8}  solve by"
+            f" {'solves':>7} {'random':>8} {'MB':>6} {'modules':>7}  solve by"
         ),
     ]
     for name, row in result["cases"].items():
         lines.append(
             f"{name:<18} {1e3 * row['total_s']:>8.1f} {row['ratio']:>6.2f}x {row['steps']:>6}"
-            f" {row['factorisations']:>15} {row['solves']:>7} {row['random_numbers']:>8.0f} "
-            f" {row['method']}"
+            f" {row['factorisations']:>15} {row['solves']:>7} {row['random_numbers']:>8.0f}"
+            f" {row['peak_mb']:>6.1f} {row['modules']:>7}  {row['method']}"
         )
     return "\n".join(lines)
 

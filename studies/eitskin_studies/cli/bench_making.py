@@ -2,10 +2,11 @@
 
 import argparse
 import json
+from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import option
-from eitskin_studies.cli.bench_shared import check_within, progress_bar
+from eitskin_studies.cli.bench_shared import add_page_option, check_within, progress_bar
 
 
 def add_jacobian(what: Any) -> None:
@@ -29,19 +30,32 @@ def run_jacobian(options: argparse.Namespace) -> int:
 def add_effects(what: Any) -> None:
     """``bench effects``."""
     parser = what.add_parser(
-        "effects", help="scenes: the time with no effect, with each alone, with all"
+        "effects",
+        help="scenes: time, memory, work and modules with no effect, with each alone, with all",
     )
     option(parser, "--frames", default=100)
-    option(parser, "--json")
+    option(parser, "--picture PNG", "draw it", Path)
+    add_page_option(parser, "scene-cost")
     parser.set_defaults(run=run_effects)
 
 
 def run_effects(options: argparse.Namespace) -> int:
     """Time each effect on one scene."""
+    from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import scenes as bench_scenes
+    from eitskin_studies.harness.sections import fill_marks
 
     check_within("--frames", options.frames, 2, 100_000)
+    refuse_unwritable(options.page, options.picture)
     result = bench_scenes.effects_table(options.frames, progress=progress_bar)
+    if options.picture is not None:
+        from eitskin_studies.pictures.scene_cost_picture import draw_scene_cost
+
+        draw_scene_cost(options.picture, result)
+    if options.page is not None:
+        command = f"eitskin bench effects --frames {options.frames}"
+        command += " --page studies/results/scene-cost.md --picture PNG"
+        fill_marks(options.page, "scene-cost", bench_scenes.effects_filling(result, command))
     print(json.dumps(result, indent=2) if options.json else bench_scenes.effects_text(result))
     return 0
 
