@@ -93,6 +93,7 @@ bool fw_instrument_step(fw_instrument *instrument)
     const bool framed = process_frame(instrument);
     fw_current_check(&instrument->safety, fw_acquire_running(&instrument->acquire));
     check_analog_supply(instrument);
+    fw_scanning_probed(&instrument->link);
     fw_scanning_watch(&instrument->link);
     fw_upload_check(&instrument->link);
     set_leds(instrument);

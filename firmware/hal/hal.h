@@ -50,6 +50,7 @@ typedef struct fw_capture_setup {
     uint32_t slot_us; /* from burst to burst; longer than the burst */
 } fw_capture_setup;
 #define FW_MAX_SAMPLES 1024u
+#define FW_MODEL_UA    1000u /* amplitude of the current that models are made for */
 
 typedef struct fw_burst {
     const uint16_t *samples; /* right-aligned codes; valid until the next burst ends */
@@ -75,7 +76,8 @@ typedef struct fw_capture {
     /* of the converter: full_scale_code + 1 steps (STM32 data sheets, "1 LSB ideal = VREF+ /
      * 4096") */
     uint32_t reference_uv;
-    /* volts at the converter per volt between the electrodes, in millionths */
+    /* volts at the converter per volt that the model's current would cause between the electrodes,
+     * in millionths */
     uint32_t front_end_gain_ppm;
 } fw_capture;
 
@@ -128,7 +130,7 @@ typedef struct fw_system_ops {
     void (*reset)(void *ctx);                   /* does not return */
     uint32_t (*stack_used)(void *ctx);          /* the most bytes so far */
     void (*set_leds)(void *ctx, uint32_t leds); /* bit 0 alive, bit 1 touch, bit 2 fault */
-    bool (*button)(void *ctx); /* the owner holds it now; NULL: the board has none */
+    bool (*button)(void *ctx);                  /* the level of its pin; NULL: the board has none */
     /* `work` runs soon, after the interrupts and before the main loop continues. It is always the
      * same function. Called from the capture's interrupt, the main loop, or `work`. */
     void (*later)(void *ctx, void (*work)(void *user), void *user);
@@ -154,6 +156,9 @@ typedef struct fw_board {
     /* The current of the source as built; 0: none flows. It bounds the excitation from below
      * (docs/guide/hardware.md, "Safety"). */
     uint32_t source_ua_rms;
+    /* The same as an amplitude, and volts at the converter per volt between the electrodes, in
+     * millionths: as designed, the owner's settings may have others; 0: the board does not know. */
+    uint32_t source_ua, gain_ppm;
     /* dropped after the current is switched on, while capacitors in its path settle */
     uint32_t settle_frames;
     fw_spi generator; /* AD9833 */

@@ -45,7 +45,7 @@ TEST(test_lengths)
 TEST(test_unknown)
 {
     eits_command_plain c = {0};
-    REPLY(host_command(&b.host, (eits_packet_type)0x90, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND,
+    REPLY(host_command(&b.host, (eits_packet_type)0x91, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND,
           0, 0);
     REPLY(host_command(&b.host, (eits_packet_type)0xFF, &c, sizeof c), EITS_REPLY_UNKNOWN_COMMAND,
           0, 0);

@@ -2,6 +2,7 @@
  * the limit on current; hashes. */
 #include "steps.h"
 
+#include "app/acquire/demodulate.h"
 #include "app/link/sha256.h"
 #include "app/safety/current_enable.h"
 #include "app/safety/owner_record.h"
@@ -35,7 +36,7 @@ static void run_alive(uint32_t ms)
 
 static eits_packet_reply set_named(uint32_t settings, uint32_t limit_ua, const char *name)
 {
-    eits_command_settings c = {0, settings, limit_ua, {0}};
+    eits_command_settings c = {0, settings, limit_ua, {0}, 0, 0};
     memcpy(c.name, name, strlen(name));
     return host_command(&b.host, EITS_PACKET_SETTINGS, &c, sizeof c);
 }
@@ -130,7 +131,7 @@ TEST(test_owner_keeps_it)
 TEST(test_lock)
 {
     start_unheard();
-    CHECK_EQUAL(set(8, 0).status, EITS_REPLY_RANGE);
+    CHECK_EQUAL(set(16, 0).status, EITS_REPLY_RANGE);
     CHECK_EQUAL(set(0, 10001).status, EITS_REPLY_RANGE);
     TAKEN(set(EITS_SETTING_LOCKED, 400));
     bench_restart(&b);
@@ -181,7 +182,7 @@ TEST(test_name)
         CHECK_EQUAL(reply.status, EITS_REPLY_RANGE);
         CHECK_EQUAL(reply.detail[0], offsetof(eits_command_settings, name));
     }
-    eits_command_settings behind = {0, 0, 0, "a"};
+    eits_command_settings behind = {0, 0, 0, "a", 0, 0};
     behind.name[EITS_NAME_CHARACTERS - 1] = 'b'; /* not zero-filled */
     CHECK_EQUAL(host_command(&b.host, EITS_PACKET_SETTINGS, &behind, sizeof behind).status,
                 EITS_REPLY_RANGE);
@@ -191,6 +192,50 @@ TEST(test_name)
     CHECK_EQUAL(info.current_limit_ua_rms, 400);
     TAKEN(set(0, 0));
     CHECK_EQUAL(host_info(&b.host).name[0], 0);
+}
+
+/* Source and gain as fitted scale the volts and the safe frequency; they are kept, also where a
+ * later command leaves them; out of range they are refused and change nothing. */
+TEST(test_source_and_gain)
+{
+    start_unheard();
+    b.board.board.source_ua = 500;
+    b.board.board.gain_ppm = 3000000;
+    eits_command_settings c = {0, 0, 0, {0}, 250, 6000000};
+    const uint32_t before_nv = fw_volts_per_code_nv(&b.board.board.capture);
+    TAKEN(host_command(&b.host, EITS_PACKET_SETTINGS, &c, sizeof c));
+    eits_packet_info info = host_info(&b.host);
+    CHECK_EQUAL(info.source_ua, 250);
+    CHECK_EQUAL(info.source_ua_rms, 176);
+    CHECK_EQUAL(info.current_limit_ua_rms, 176 + 44);
+    CHECK_EQUAL(info.gain_ppm, 6000000);
+    const fw_capture fitted = {.full_scale_code = b.board.board.capture.full_scale_code,
+                               .reference_uv = b.board.board.capture.reference_uv,
+                               .front_end_gain_ppm = 1500000};
+    CHECK_EQUAL(info.volts_per_code_nv, fw_volts_per_code_nv(&fitted));
+    CHECK(before_nv > 0);
+    c.source_ua = c.gain_ppm = EITS_KEPT;
+    TAKEN(host_command(&b.host, EITS_PACKET_SETTINGS, &c, sizeof c));
+    CHECK_EQUAL(host_info(&b.host).source_ua, 250);
+    const struct {
+        uint32_t source_ua, gain_ppm, offset;
+    } refused[] = {{9, 0, offsetof(eits_command_settings, source_ua)},
+                   {7001, 0, offsetof(eits_command_settings, source_ua)},
+                   {0, 9999, offsetof(eits_command_settings, gain_ppm)},
+                   {0, 400000001, offsetof(eits_command_settings, gain_ppm)}};
+    for (size_t k = 0; IN_TABLE(k, refused); ++k) {
+        c.source_ua = refused[k].source_ua;
+        c.gain_ppm = refused[k].gain_ppm;
+        const eits_packet_reply reply = host_command(&b.host, EITS_PACKET_SETTINGS, &c, sizeof c);
+        CHECK_EQUAL(reply.status, EITS_REPLY_RANGE);
+        CHECK_EQUAL(reply.detail[0], refused[k].offset);
+    }
+    CHECK_EQUAL(host_info(&b.host).gain_ppm, 6000000);
+    c.source_ua = c.gain_ppm = 0;
+    TAKEN(host_command(&b.host, EITS_PACKET_SETTINGS, &c, sizeof c));
+    info = host_info(&b.host);
+    CHECK_EQUAL(info.source_ua, 500);
+    CHECK_EQUAL(info.source_ua_rms, 350);
 }
 
 static fw_status save(const fw_store *store, uint32_t settings)
@@ -238,7 +283,7 @@ TEST(test_cuts)
 TEST(test_limit)
 {
     start_unheard();
-    TAKEN(set(0, EITS_LIMIT_KEPT));
+    TAKEN(set(0, EITS_KEPT));
     CHECK_EQUAL(fw_owner_record_load(&b.board.board.store).current_limit_ua_rms, 0);
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 437); /* 1.25 times 350 */
     b.board.current_ua = 500;
@@ -264,7 +309,7 @@ TEST(test_limit)
     CHECK_EQUAL(host_tare(&b.host, 4).status, EITS_REPLY_TRIPPED);
     TAKEN(set(EITS_SETTING_KEEP_CURRENT | EITS_SETTING_SENSE, 400));
     CHECK(!drives());
-    TAKEN(set(EITS_SETTING_SENSE, EITS_LIMIT_KEPT));
+    TAKEN(set(EITS_SETTING_SENSE, EITS_KEPT));
     CHECK_EQUAL(host_info(&b.host).current_limit_ua_rms, 400);
     TAKEN(host_plain(&b.host, EITS_PACKET_CLEAR_FAULTS));
     b.board.current_ua = 350;

@@ -232,6 +232,8 @@ static void check_lock(const fw_instrument *before)
         return;
     MUST(now->safety.owner.settings == before->safety.owner.settings);
     MUST(now->safety.owner.current_limit_ua_rms == before->safety.owner.current_limit_ua_rms);
+    MUST(now->safety.owner.source_ua == before->safety.owner.source_ua);
+    MUST(now->safety.owner.gain_ppm == before->safety.owner.gain_ppm);
     MUST(memcmp(now->safety.owner.name, before->safety.owner.name, EITS_NAME_CHARACTERS) == 0);
     MUST(now->link.upload.begun <= before->link.upload.begun);
     MUST(now->acquire.settings.excitation_millihz >= before->acquire.settings.excitation_millihz);

@@ -18,8 +18,10 @@ extern "C" {
 /* The first byte of every packet; a packet of another version is rejected. */
 #define EITS_LINK_VERSION     6u
 #define EITS_LINK_MAX_PAYLOAD 16384u
-/* Of SETTINGS: the limit stays as it is. */
-#define EITS_LIMIT_KEPT       0xFFFFFFFFu
+/* Of SETTINGS: a number stays as it is. */
+#define EITS_KEPT             0xFFFFFFFFu
+/* Of PROBE: all electrodes are open. */
+#define EITS_PROBE_OPEN       0xFFFFFFFFu
 /* The most characters of a board's name. */
 #define EITS_NAME_CHARACTERS  32u
 
@@ -45,6 +47,8 @@ typedef enum eits_packet_type {
     EITS_PACKET_FAULT = 0x14,
     /* SHA-256 of the model and of the firmware */
     EITS_PACKET_HASHES = 0x16,
+    /* codes of a fixed row */
+    EITS_PACKET_PROBED = 0x18,
     /* never on a wire: the first packet of an .eits file */
     EITS_PACKET_RECORDING = 0x70,
     /* send an INFO */
@@ -78,7 +82,9 @@ typedef enum eits_packet_type {
     /* the owner's settings, kept in flash */
     EITS_PACKET_SETTINGS = 0x8e,
     /* send HASHES */
-    EITS_PACKET_GET_HASHES = 0x8f
+    EITS_PACKET_GET_HASHES = 0x8f,
+    /* measure a fixed row once and send PROBED */
+    EITS_PACKET_PROBE = 0x90
 } eits_packet_type;
 
 /* The result of a command; `detail` of the reply adds to it. */
@@ -303,6 +309,14 @@ typedef struct eits_packet_info {
     uint32_t current_limit_ua_rms;
     /* that the owner gave the board, zero-filled; empty: none */
     char name[32];
+    /* amplitude of the current source; 0: not known */
+    uint32_t source_ua;
+    /* volts at the converter per volt between the electrodes, in millionths; 0: not known */
+    uint32_t gain_ppm;
+    /* the level of the button's pin now; 2: there is none */
+    uint32_t button;
+    /* 0 */
+    uint32_t reserved;
 } eits_packet_info;
 
 /* The result of the command with this request number. */
@@ -697,7 +711,9 @@ typedef enum eits_setting {
     /* models, settings and lower excitations need the blue button */
     EITS_SETTING_LOCKED = 2,
     /* a sense resistor is fitted: the current is measured */
-    EITS_SETTING_SENSE = 4
+    EITS_SETTING_SENSE = 4,
+    /* the owner's button pulls its pin low, and does not lift it */
+    EITS_SETTING_BUTTON_LOW = 8
 } eits_setting;
 
 /* The host is there. Any command says so; this one asks for nothing, and is not answered. */
@@ -718,6 +734,11 @@ typedef struct eits_command_settings {
     uint32_t current_limit_ua_rms;
     /* letters, digits, - and _, the first a letter or digit; zero-filled; empty: none */
     char name[32];
+    /* amplitude of the current source as fitted, 10 to 7,000; 0: as designed; 2^32 - 1: as it is */
+    uint32_t source_ua;
+    /* from electrodes to converter as fitted, 10,000 to 400,000,000; 0: as designed; 2^32 - 1: as
+     * it is */
+    uint32_t gain_ppm;
 } eits_command_settings;
 
 /* SHA-256 of what the board's flash holds. */
@@ -729,6 +750,39 @@ typedef struct eits_packet_hashes {
     /* of the program; zero: not known */
     uint8_t firmware[32];
 } eits_packet_hashes;
+
+/* Take one burst of a fixed row, after another one of the row before it, so that its first samples
+ * show how it settles. The scan waits meanwhile. */
+typedef struct eits_command_probe {
+    /* never 0; PROBED repeats it */
+    uint32_t request;
+    /* electrodes of I+, I-, V+, V- of 8 bits each, the first one lowest; 2^32 - 1: all open */
+    uint32_t before;
+    /* the same of the burst that is sent */
+    uint32_t joined;
+    /* from the switch to the burst's first sample, at least; at most 50,000 */
+    uint16_t settle_us;
+    /* 4 to 1024; those of SCAN's rate */
+    uint16_t samples;
+    /* 1: it runs; 0: it is in reset */
+    uint16_t generator;
+    /* 0 */
+    uint16_t reserved;
+} eits_command_probe;
+
+/* A burst of a fixed row; then its samples, codes of the converter, u16 each. */
+typedef struct eits_packet_probed {
+    /* of the PROBE that asked */
+    uint32_t request;
+    /* when the burst began, on the board's clock */
+    uint32_t start_us;
+    /* when its electrodes had been joined */
+    uint32_t switched_us;
+    /* that follow */
+    uint16_t samples;
+    /* 1: the converter lost samples */
+    uint16_t lost;
+} eits_packet_probed;
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,6 @@
 /* Payloads are copied as they lie in memory. Written by tables/make_tables.py from
  * tables/link.toml. */
-_Static_assert(sizeof(eits_packet_info) == 200, "eits_packet_info has padding");
+_Static_assert(sizeof(eits_packet_info) == 216, "eits_packet_info has padding");
 _Static_assert(sizeof(eits_packet_reply) == 16, "eits_packet_reply has padding");
 _Static_assert(sizeof(eits_packet_raw) == 16, "eits_packet_raw has padding");
 _Static_assert(sizeof(eits_packet_solved) == 104, "eits_packet_solved has padding");
@@ -22,5 +22,7 @@ _Static_assert(sizeof(eits_command_model_data) == 8, "eits_command_model_data ha
 _Static_assert(sizeof(eits_command_get_stats) == 8, "eits_command_get_stats has padding");
 _Static_assert(sizeof(eits_command_mask_row) == 8, "eits_command_mask_row has padding");
 _Static_assert(sizeof(eits_command_keepalive) == 8, "eits_command_keepalive has padding");
-_Static_assert(sizeof(eits_command_settings) == 44, "eits_command_settings has padding");
+_Static_assert(sizeof(eits_command_settings) == 52, "eits_command_settings has padding");
 _Static_assert(sizeof(eits_packet_hashes) == 68, "eits_packet_hashes has padding");
+_Static_assert(sizeof(eits_command_probe) == 20, "eits_command_probe has padding");
+_Static_assert(sizeof(eits_packet_probed) == 16, "eits_packet_probed has padding");

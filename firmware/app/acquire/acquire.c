@@ -4,6 +4,7 @@
 #include "app/clock.h"
 #include "app/safety/current_enable.h"
 #include "app/safety/faults.h"
+#include "app/safety/owner.h"
 
 void fw_acquire_init(fw_acquire *acquire, const fw_board *board, fw_safety *safety)
 {
@@ -20,7 +21,7 @@ const fw_scan_settings *fw_acquire_settings(const fw_acquire *acquire)
 
 fw_status fw_acquire_set(fw_acquire *acquire, const fw_scan_settings *settings)
 {
-    (void)fw_scan_stop(&acquire->scan);
+    (void)fw_acquire_stop(acquire);
     const fw_status status = fw_scan_configure(&acquire->scan, settings);
     if (status == FW_OK)
         acquire->settings = *settings;
@@ -45,12 +46,14 @@ float fw_acquire_noise_floor_v(const fw_acquire *acquire)
     const fw_scan_settings *s = &acquire->settings;
     if (acquire->board->frames_given)
         return 0;
-    return fw_rounding_v(fw_volts_per_code_nv(&acquire->board->capture), s->excitation_millihz,
-                         s->sample_rate_hz, s->samples);
+    const fw_capture capture = fw_owner_capture(acquire->safety);
+    return fw_rounding_v(fw_volts_per_code_nv(&capture), s->excitation_millihz, s->sample_rate_hz,
+                         s->samples);
 }
 
 fw_status fw_acquire_stop(fw_acquire *acquire)
 {
+    fw_probe_stop(&acquire->probe);
     return fw_scan_stop(&acquire->scan);
 }
 
@@ -75,9 +78,10 @@ static fw_status start_scan(fw_acquire *acquire, const fw_scan_table *table, fw_
 {
     const fw_board *board = acquire->board;
     const fw_scan_settings *s = &acquire->settings;
-    const fw_status status = fw_demodulate_setup(
-        &acquire->demodulator, &board->capture, board->mclk_hz, acquire->generator.tuning,
-        s->excitation_millihz, s->sample_rate_hz, s->samples);
+    const fw_capture capture = fw_owner_capture(acquire->safety);
+    const fw_status status = fw_demodulate_setup(&acquire->demodulator, &capture, board->mclk_hz,
+                                                 acquire->generator.tuning, s->excitation_millihz,
+                                                 s->sample_rate_hz, s->samples);
     return status == FW_OK ? fw_scan_start(&acquire->scan, s, table, frames) : status;
 }
 
@@ -103,6 +107,22 @@ fw_started fw_acquire_start(fw_acquire *acquire, fw_status stopped, const fw_sca
     return started;
 }
 
+fw_status fw_acquire_probe(fw_acquire *acquire, const fw_probe_setup *setup)
+{
+    const bool joins = setup->before != FW_PROBE_OPEN || setup->joined != FW_PROBE_OPEN;
+    if (joins && setup->generator && !fw_current_allowed(acquire->safety))
+        return FW_E_ARGUMENT;
+    bool new_phase;
+    const fw_status status =
+        setup->generator ? start_generator(acquire, &new_phase) : stop_generator(acquire);
+    return status == FW_OK ? fw_probe_start(&acquire->probe, acquire->board, setup) : status;
+}
+
+const fw_probe *fw_acquire_probed(const fw_acquire *acquire)
+{
+    return fw_probe_active(&acquire->probe) ? &acquire->probe : NULL;
+}
+
 bool fw_acquire_running(const fw_acquire *acquire)
 {
     return acquire->scan.running;
@@ -115,13 +135,14 @@ bool fw_acquire_stalled(fw_acquire *acquire)
 
 bool fw_acquire_retry_due(const fw_acquire *acquire)
 {
-    return !acquire->scan.running && fw_current_allowed(acquire->safety) &&
+    return !acquire->scan.running && !fw_probe_active(&acquire->probe) &&
+           fw_current_allowed(acquire->safety) &&
            fw_now_us(acquire->board) - acquire->tried_us > FW_RETRY_US;
 }
 
 void fw_acquire_shut_down(fw_acquire *acquire)
 {
-    (void)fw_scan_stop(&acquire->scan);
+    (void)fw_acquire_stop(acquire);
     (void)fw_ad9833_stop(&acquire->generator);
 }
 

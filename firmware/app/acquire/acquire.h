@@ -4,6 +4,7 @@
 #define FW_ACQUIRE_H
 
 #include "app/acquire/frame.h"
+#include "app/acquire/probe.h"
 #include "hal/hal.h"
 
 typedef struct fw_acquire fw_acquire;
@@ -56,6 +57,14 @@ bool fw_acquire_retry_due(const fw_acquire *acquire);
 
 /* Before a reset of the board: stop the scan and the generator. */
 void fw_acquire_shut_down(fw_acquire *acquire);
+
+/* ---- a fixed row ---- */
+/* After fw_acquire_stop: take one burst as `setup` says. Errors: as fw_probe_start; FW_E_ARGUMENT
+ * if electrodes are joined and the generator runs though no current is allowed. */
+fw_status fw_acquire_probe(fw_acquire *acquire, const fw_probe_setup *setup);
+
+/* The burst that is under way, or done; NULL: none. It is over with fw_acquire_stop. */
+const fw_probe *fw_acquire_probed(const fw_acquire *acquire);
 
 /* ---- what is measured ---- */
 /* The oldest full frame, or NULL; it stays the caller's until the release. */

@@ -4,6 +4,7 @@
 
 #include "app/acquire/demodulate.h"
 #include "app/acquire/frame.h"
+#include "app/acquire/probe.h"
 #include "app/acquire/scan.h"
 #include "drivers/ad9833.h"
 
@@ -14,6 +15,7 @@ struct fw_acquire {
     fw_demodulator demodulator;
     fw_scan_settings settings;
     fw_scan scan;
+    fw_probe probe;
     uint32_t tried_us; /* when a start was last tried */
 };
 

@@ -28,6 +28,7 @@ enum {
     MIN_MODEL = 64
 };
 enum { MAX_EXCITATION_MILLIHZ = 250000000, MAX_UA_RMS = 10000 };
+enum { MIN_SOURCE_UA = 10, MAX_SOURCE_UA = 7000, MIN_GAIN_PPM = 10000, MAX_GAIN_PPM = 400000000 };
 
 static fw_answer ok(void)
 {
@@ -334,32 +335,60 @@ static fw_answer on_keepalive(fw_host_link *link, const void *payload, size_t si
     return (fw_answer){.later = true};
 }
 
+/* The same of a number that may also be 0, as designed, or EITS_KEPT. */
+static bool setting_outside(fw_answer *out, size_t offset, uint32_t value, uint32_t low,
+                            uint32_t high)
+{
+    return value != 0 && value != EITS_KEPT && outside(out, offset, value, low, high);
+}
+
+static bool settings_outside(fw_host_link *link, const eits_command_settings *c, fw_answer *bad)
+{
+    const uint32_t all = EITS_SETTING_KEEP_CURRENT | EITS_SETTING_LOCKED | EITS_SETTING_SENSE |
+                         EITS_SETTING_BUTTON_LOW;
+    if (outside(bad, offsetof(eits_command_settings, settings), c->settings, 0, all) ||
+        setting_outside(bad, offsetof(eits_command_settings, current_limit_ua_rms),
+                        c->current_limit_ua_rms, 0, MAX_UA_RMS))
+        return true;
+    if (!fw_owner_name_valid(c->name)) {
+        *bad = fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_settings, name),
+                         EITS_NAME_CHARACTERS);
+        return true;
+    }
+    /* so much is safe at the excitation in use, and at the one after a restart */
+    const uint32_t safe_ua =
+        (uint32_t)((uint64_t)fw_acquire_settings(link->acquire)->excitation_millihz * 141u /
+                   1000000u);
+    const uint32_t most_ua = safe_ua < MAX_SOURCE_UA ? safe_ua : MAX_SOURCE_UA;
+    return setting_outside(bad, offsetof(eits_command_settings, source_ua), c->source_ua,
+                           MIN_SOURCE_UA, most_ua) ||
+           setting_outside(bad, offsetof(eits_command_settings, gain_ppm), c->gain_ppm,
+                           MIN_GAIN_PPM, MAX_GAIN_PPM);
+}
+
 static fw_answer on_settings(fw_host_link *link, const void *payload, size_t size)
 {
     eits_command_settings c;
     fw_answer bad;
     (void)size;
     memcpy(&c, payload, sizeof c);
-    const uint32_t all = EITS_SETTING_KEEP_CURRENT | EITS_SETTING_LOCKED | EITS_SETTING_SENSE;
-    if (c.current_limit_ua_rms == EITS_LIMIT_KEPT)
-        c.current_limit_ua_rms = fw_owner_current_limit_ua(link->safety);
-    if (outside(&bad, offsetof(eits_command_settings, settings), c.settings, 0, all) ||
-        outside(&bad, offsetof(eits_command_settings, current_limit_ua_rms), c.current_limit_ua_rms,
-                0, MAX_UA_RMS))
+    if (settings_outside(link, &c, &bad))
         return bad;
-    if (!fw_owner_name_valid(c.name))
-        return fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_settings, name),
-                         EITS_NAME_CHARACTERS);
     if (fw_owner_refuses(link->safety, EITS_PACKET_SETTINGS))
         return locked();
     if (fw_current_state(link->safety) !=
         EITS_DRIVE_TRIPPED) /* erasing the flash may take seconds */
         fw_current_off(link->safety, EITS_DRIVE_OFF);
+    const fw_capture before = fw_owner_capture(link->safety);
     fw_owner_record wanted = {.settings = c.settings,
-                              .current_limit_ua_rms = c.current_limit_ua_rms};
+                              .current_limit_ua_rms = c.current_limit_ua_rms,
+                              .source_ua = c.source_ua,
+                              .gain_ppm = c.gain_ppm};
     memcpy(wanted.name, c.name, sizeof wanted.name);
     if (fw_owner_save(link->safety, &wanted) != FW_OK)
         return fw_refuse(EITS_REPLY_FLASH, 0, 0);
+    if (fw_owner_capture(link->safety).front_end_gain_ppm != before.front_end_gain_ppm)
+        fw_solve_scan_changed(link->solve); /* the reference is of other volts */
     if ((c.settings & EITS_SETTING_KEEP_CURRENT) != 0)
         (void)fw_current_on(link->safety);
     return ok();
@@ -371,6 +400,45 @@ static fw_answer on_get_hashes(fw_host_link *link, const void *payload, size_t s
     (void)size;
     memcpy(&c, payload, sizeof c);
     fw_send_hashes(link, c.request);
+    return (fw_answer){.later = true};
+}
+
+/* The address lines of four electrodes of 8 bits each, I+ lowest; false: no such electrodes. */
+static bool electrodes_to_lines(uint32_t electrodes, uint32_t *lines)
+{
+    const uint8_t four[4] = {(uint8_t)electrodes, (uint8_t)(electrodes >> 8),
+                             (uint8_t)(electrodes >> 16), (uint8_t)(electrodes >> 24)};
+    *lines = FW_PROBE_OPEN;
+    return electrodes == EITS_PROBE_OPEN || fw_adg1206_addresses(four, lines) == FW_OK;
+}
+
+static fw_answer on_probe(fw_host_link *link, const void *payload, size_t size)
+{
+    eits_command_probe c;
+    fw_answer bad;
+    (void)size;
+    memcpy(&c, payload, sizeof c);
+    fw_probe_setup setup = {.settings = *fw_acquire_settings(link->acquire),
+                            .generator = c.generator != 0};
+    if (!electrodes_to_lines(c.before, &setup.before))
+        return fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_probe, before), FW_ELECTRODES);
+    if (!electrodes_to_lines(c.joined, &setup.joined))
+        return fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_probe, joined), FW_ELECTRODES);
+    if (outside(&bad, offsetof(eits_command_probe, settle_us), c.settle_us, 0, MAX_SETTLE_US) ||
+        outside(&bad, offsetof(eits_command_probe, samples), c.samples, MIN_SAMPLES,
+                FW_MAX_SAMPLES) ||
+        outside(&bad, offsetof(eits_command_probe, generator), c.generator, 0, 1))
+        return bad;
+    setup.settings.settle_us = c.settle_us;
+    setup.settings.samples = c.samples;
+    if (!fw_current_on(link->safety))
+        return fw_refuse(EITS_REPLY_TRIPPED, 0, 0);
+    if (link->board->frames_given || fw_acquire_stop(link->acquire) != FW_OK ||
+        fw_acquire_probe(link->acquire, &setup) != FW_OK) {
+        fw_scanning_restart(link);
+        return fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_probe, samples), 0);
+    }
+    link->probe_request = c.request;
     return (fw_answer){.later = true};
 }
 
@@ -403,6 +471,7 @@ static const command COMMANDS[] = {
     {EITS_PACKET_SETTINGS, sizeof(eits_command_settings), NOT_IN_TARE | NOT_IN_UPLOAD, on_settings},
     {EITS_PACKET_GET_HASHES, sizeof(eits_command_plain), NOT_IN_TARE | NOT_IN_UPLOAD,
      on_get_hashes},
+    {EITS_PACKET_PROBE, sizeof(eits_command_probe), NOT_IN_TARE | NOT_IN_UPLOAD, on_probe},
 };
 
 static fw_answer dispatch(fw_host_link *link, const eits_link_packet *packet)

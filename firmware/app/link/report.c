@@ -13,6 +13,8 @@
 #include "app/solve/tare.h"
 #include "drivers/ad9833.h"
 
+enum { NO_BUTTON = 2 };
+
 static void copy_text(char *to, size_t room, const char *from)
 {
     for (size_t k = 0; k < room && from != NULL && from[k] != 0; ++k)
@@ -54,7 +56,13 @@ static void report_scan(const fw_host_link *link, eits_packet_info *info)
     info->samples = (uint16_t)s->samples;
     info->settle_us = (uint16_t)s->settle_us;
     info->slot_us = fw_slot_us(s);
-    info->volts_per_code_nv = fw_volts_per_code_nv(&board->capture);
+    const fw_capture capture = fw_owner_capture(link->safety);
+    info->volts_per_code_nv = fw_volts_per_code_nv(&capture);
+}
+
+static uint32_t button_level(const fw_board *board)
+{
+    return board->system->button == NULL ? NO_BUTTON : board->system->button(board->system_ctx);
 }
 
 void fw_send_info(fw_host_link *link, uint32_t request)
@@ -72,9 +80,12 @@ void fw_send_info(fw_host_link *link, uint32_t request)
                              .faults = fw_faults_raised(safety),
                              .drive = (uint16_t)fw_current_state(safety),
                              .settings = (uint16_t)fw_owner_settings(safety),
-                             .source_ua_rms = board->source_ua_rms,
+                             .source_ua_rms = fw_owner_source_ua_rms(safety),
                              .current_ua_rms = fw_current_ua(safety),
-                             .current_limit_ua_rms = fw_current_limit_ua(safety)};
+                             .current_limit_ua_rms = fw_current_limit_ua(safety),
+                             .source_ua = fw_owner_source_ua(safety),
+                             .gain_ppm = fw_owner_gain_ppm(safety),
+                             .button = button_level(board)};
     report_scan(link, &info);
     copy_text(info.board, sizeof info.board - 1, board->name);
     copy_text(info.serial, sizeof info.serial, board->serial);

@@ -1,6 +1,7 @@
 #include "app/link/scanning.h"
 
 #include "app/acquire/acquire.h"
+#include "app/clock.h"
 #include "app/link/report.h"
 #include "app/link/state.h"
 #include "app/link/tracks.h"
@@ -8,6 +9,8 @@
 #include "app/safety/faults.h"
 #include "app/solve/solve.h"
 #include "app/solve/tare.h"
+
+enum { PROBE_US = 500000 }; /* more than two bursts of 1024 samples and 50 ms of settling take */
 
 /* A tare that cannot go on is answered. */
 static void fail_tare(fw_host_link *link)
@@ -44,6 +47,29 @@ void fw_scanning_watch(fw_host_link *link)
     } else if (fw_acquire_retry_due(link->acquire) && measurable(link)) {
         fw_scanning_restart(link);
     }
+}
+
+void fw_scanning_probed(fw_host_link *link)
+{
+    const fw_probe *probe = fw_acquire_probed(link->acquire);
+    if (probe == NULL)
+        return;
+    if (fw_probe_done(probe)) {
+        const uint32_t samples = probe->setup.settings.samples;
+        const eits_packet_probed head = {.request = link->probe_request,
+                                         .start_us = probe->start_us,
+                                         .switched_us = probe->switched_us,
+                                         .samples = (uint16_t)samples,
+                                         .lost = probe->lost};
+        (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_PROBED, &head, sizeof head,
+                               probe->codes, samples * sizeof probe->codes[0]);
+    } else if (fw_now_us(link->board) - probe->began_us < PROBE_US) {
+        return;
+    } else {
+        fw_send_reply(link, EITS_PACKET_PROBE, link->probe_request,
+                      fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_probe, samples), 0));
+    }
+    fw_scanning_restart(link);
 }
 
 void fw_scanning_current_changed(void *link)

@@ -15,6 +15,10 @@ void fw_scanning_restart(fw_host_link *link);
  * started. */
 void fw_scanning_watch(fw_host_link *link);
 
+/* Call once per turn of the main loop: sends a fixed row's burst when it is there, and lets the
+ * scan go on. */
+void fw_scanning_probed(fw_host_link *link);
+
 /* For fw_safety_hooks; `link` is a fw_host_link. */
 void fw_scanning_current_changed(void *link);
 

@@ -59,6 +59,7 @@ struct fw_host_link {
     fw_upload upload;
     fw_replies replies;
     bool reset_wanted;
+    uint32_t probe_request;
     uint32_t deadlines_missed;
     uint32_t uptime_ms, uptime_us;
     eits_link_decoder decoder;

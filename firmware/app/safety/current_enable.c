@@ -89,13 +89,13 @@ uint32_t fw_current_ua(const fw_safety *safety)
 uint32_t fw_current_limit_ua(const fw_safety *safety)
 {
     const uint32_t limit_ua = safety->owner.current_limit_ua_rms;
-    const uint32_t source_ua = safety->board->source_ua_rms;
+    const uint32_t source_ua = fw_owner_source_ua_rms(safety);
     return limit_ua != 0 ? limit_ua : source_ua + source_ua / 4;
 }
 
 uint32_t fw_current_min_millihz(const fw_safety *safety)
 {
-    const uint32_t ua = safety->board->source_ua_rms;
+    const uint32_t ua = fw_owner_source_ua_rms(safety);
     return ua <= SAFE_UA_RMS ? MIN_MILLIHZ : ua * MILLIHZ_PER_UA;
 }
 

@@ -14,8 +14,15 @@ uint32_t fw_owner_settings(const fw_safety *safety);
 /* Whether current may flow without a host. */
 bool fw_owner_keeps_current(const fw_safety *safety);
 
-/* The owner's own limit of the current, rms; 0: the owner has set none. */
-uint32_t fw_owner_current_limit_ua(const fw_safety *safety);
+/* The current source as fitted: its amplitude, and that rms; 0: not known. */
+uint32_t fw_owner_source_ua(const fw_safety *safety);
+uint32_t fw_owner_source_ua_rms(const fw_safety *safety);
+
+/* Volts at the converter per volt between the electrodes as fitted, in millionths; 0: not known. */
+uint32_t fw_owner_gain_ppm(const fw_safety *safety);
+
+/* The board's converter, behind source and amplifier as fitted. */
+fw_capture fw_owner_capture(const fw_safety *safety);
 
 /* The board's name, EITS_NAME_CHARACTERS long and zero-filled; empty: it has none. */
 const char *fw_owner_name(const fw_safety *safety);
@@ -28,7 +35,8 @@ bool fw_owner_name_valid(const char *name);
  * is what the host asked for. */
 bool fw_owner_refuses(fw_safety *safety, eits_packet_type command);
 
-/* Store new settings and use them. Errors: as fw_owner_record_save. */
+/* Store new settings and use them; a number that is EITS_KEPT stays as it is. Errors: as
+ * fw_owner_record_save. */
 fw_status fw_owner_save(fw_safety *safety, const fw_owner_record *wanted);
 
 #endif

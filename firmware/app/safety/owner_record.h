@@ -16,8 +16,11 @@ typedef struct fw_owner_record {
     uint32_t settings;   /* bits of eits_setting */
     uint32_t current_limit_ua_rms;
     char name[EITS_NAME_CHARACTERS]; /* zero-filled; empty: none */
-    uint32_t reserved[19];           /* 0, for later settings */
-    uint32_t crc;                    /* of the bytes before */
+    /* As fitted; 0: as designed. Amplitude; volts at the converter per volt between the electrodes.
+     */
+    uint32_t source_ua, gain_ppm;
+    uint32_t reserved[17]; /* 0, for later settings */
+    uint32_t crc;          /* of the bytes before */
 } fw_owner_record;
 
 /* The latest settings; all 0 if there are none. */

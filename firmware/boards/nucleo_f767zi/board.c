@@ -1,11 +1,13 @@
 /* The NUCLEO-F767ZI as the application sees it. */
 #include "nucleo.h"
 
-/* Codes at 12 bits and 3.3 V. Models are for 1 mA: half of it and a gain of 3 give what 1 mA
- * and 1.5 would (docs/guide/hardware.md). */
+/* Codes at 12 bits and 3.3 V. Models are for 1 mA: half of it and a gain of 3 give what 1 mA and
+ * 1.5 would (docs/guide/hardware.md). The owner's settings may have another source and gain. */
 enum {
     FULL_SCALE_CODE = 4095,
     REFERENCE_UV = 3300000,
+    SOURCE_UA = 500,
+    GAIN_PPM = 3000000,
     FRONT_END_GAIN_PPM = 1500000,
     SOURCE_UA_RMS = 350,
     /* 40 ms at the fastest scan: the blocking capacitors of generator and source */
@@ -47,6 +49,8 @@ int main(void)
         .stack_bytes =
             (uint32_t)((uint8_t *)stack_top - (uint8_t *)stack_bottom) - NUCLEO_STACK_GUARD_BYTES,
         .source_ua_rms = SOURCE_UA_RMS,
+        .source_ua = SOURCE_UA,
+        .gain_ppm = GAIN_PPM,
         .settle_frames = SETTLE_FRAMES,
         .generator = {&nucleo_generator_ops, NULL},
         .multiplexers = {&nucleo_multiplexers_ops, NULL},

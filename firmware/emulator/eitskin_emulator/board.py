@@ -20,7 +20,7 @@ from eitskin_emulator.report import BoardReport
 
 LONGEST_SLICE = 5_000_000
 EXACTLY_MASKED = 10_000
-BUTTON_PIN = 13
+BUTTON_PIN, SUPPLY_PIN = 13, 11
 
 
 class EmulatedBoard(BoardParts):
@@ -28,6 +28,7 @@ class EmulatedBoard(BoardParts):
 
     strict = True  # what the monitor finds is an error
     locked_up = False
+    button_low = False
     _asleep = False
     _masked = 0  # slices since an interrupt waits behind a mask
 
@@ -76,8 +77,16 @@ class EmulatedBoard(BoardParts):
         self.cpu.end_slice()
 
     def hold_button(self, held: bool) -> None:
-        """The owner holds the blue button (B1 lifts PC13), or lets go of it."""
-        self.ports["C"].outside = 1 << BUTTON_PIN if held else 0
+        """The owner holds the blue button (B1 lifts PC13, or where ``button_low`` pulls it low), or
+        lets go of it."""
+        lifted = held != self.button_low
+        self.ports["C"].outside = 1 << BUTTON_PIN if lifted else 0
+
+    def lose_analog(self, lost: bool) -> None:
+        """The +-15 V go, and with them the light of the supply-good circuit (PC11), or come
+        back."""
+        self.front_end.supplied = not lost
+        self.ports["C"].lowered = 1 << SUPPLY_PIN if lost else 0
 
     def halt(self, time_s: float) -> None:
         """A debugger halts the processor for so long. All else goes on, but for what the program

@@ -11,6 +11,7 @@ from eitskin.errors import DeviceError
 from eitskin.model.eitm import decode_model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.library_scenes import find_scene
+from eitskin_emulator.analog.fixture import Fixture, chain, ring
 from eitskin_emulator.board import EmulatedBoard
 from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
 from eitskin_emulator.image import image_bytes
@@ -92,6 +93,12 @@ class EmulatedTransport(Transport):
 
     def reopen(self) -> bool:
         return not self._closed
+
+    def connect(self, fixture: str) -> bool:
+        """Put a fixture of the bring-up on the electrodes."""
+        fixtures = {"nothing": Fixture({}), "chain": chain(), "ring": ring(), "skin": None}
+        self.board.front_end.fixture = fixtures[fixture]
+        return True
 
     def begin_scene(self) -> int:
         """Let the scene's time 0 be now, by the board's microsecond clock."""

@@ -6,6 +6,7 @@ from eitskin.cli.arguments import option
 from eitskin.cli.device_options import add_device, open_named
 from eitskin.cli.printing import answer, say
 from eitskin.device.client import TARE_FRAMES, check_tare_frames
+from eitskin.errors import DeviceError
 from eitskin.session.set_up import wait_untouched
 
 
@@ -43,5 +44,8 @@ def run(options: argparse.Namespace) -> int:
         if not device.transport.capabilities.own_clock:
             say(f"leave the skin untouched: taking the reference from {options.frames} frames")
         wait_untouched(lambda: device.tare(options.frames, anyway=options.anyway), say)
+        wrong = device.unserved()
+        if wrong is not None:
+            raise DeviceError(f"{device.transport.name}: {wrong}")
     facts = {"device": url, "frames": options.frames, "tared": True}
     return answer(options, facts, f"{url}: reference taken from {options.frames} frames")

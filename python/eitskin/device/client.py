@@ -1,7 +1,7 @@
 """A board's commands with their answers, and what it streams, whatever kind of device is behind
 it."""
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +9,7 @@ from eitskin.core.diagnostics import names
 from eitskin.core.options_table import CHOICES
 from eitskin.core.results import Options, check_options
 from eitskin.device.exchange import ANSWER_S, CommandExchange
+from eitskin.device.fitting import unserved
 from eitskin.device.link import Streamed
 from eitskin.device.pacing import Pacer
 from eitskin.device.streaming import LEAVE_S, packet_stream
@@ -17,7 +18,14 @@ from eitskin.device.upload import upload
 from eitskin.device.wire import link_table as commands
 from eitskin.device.wire.explain import found_touched, reply_text
 from eitskin.device.wire.link_table import Setting, Stream
-from eitskin.device.wire.packets import BoardHashes, BoardInfo, BoardStats, SolvedTouches
+from eitskin.device.wire.packets import (
+    BoardHashes,
+    BoardInfo,
+    BoardStats,
+    ProbedBurst,
+    RawFrame,
+    SolvedTouches,
+)
 from eitskin.errors import DeviceError, SkinTouchedError, UsageError
 from eitskin.threads import OneThreadAtATime
 
@@ -34,6 +42,14 @@ def _asked_millihz(info: BoardInfo) -> int:
     rate_millihz = 1000 * info.sample_rate_hz
     periods = round(info.excitation_millihz * info.samples / rate_millihz)
     return periods * rate_millihz // info.samples
+
+
+def _electrodes(row: Sequence[int] | None) -> int:
+    if row is None:
+        return commands.PROBE_OPEN
+    if len(row) != 4 or not all(0 <= one <= 255 for one in row):
+        raise UsageError(f"electrodes {list(row)}: give four, those of I+, I-, V+ and V-")
+    return sum(int(one) << 8 * k for k, one in enumerate(row))
 
 
 def check_tare_frames(frames: int) -> int:
@@ -68,7 +84,8 @@ class Device(CommandExchange):
         Raises:
             UsageError: another number of frames.
             SkinTouchedError: something touches the skin or moves on it; the last reference stays.
-            DeviceError: the board refuses, or its core the frames.
+            DeviceError: the board refuses, or its core the frames; where source and amplifier do
+                not serve the skin, it names the part to change.
         """
         check_tare_frames(frames)
         wait_s = 3.0 + 2e-6 * max(self.board.frame_us, 1000) * (frames + 4)
@@ -84,7 +101,10 @@ class Device(CommandExchange):
         if reply.ok:
             return
         text = f"{self.transport.name}: {reply_text(reply)}"
-        raise (SkinTouchedError if found_touched(reply) else DeviceError)(text)
+        wrong = self.unserved()  # rows that clip can look like touches
+        if wrong is None and found_touched(reply):
+            raise SkinTouchedError(text)
+        raise DeviceError(f"{text}; {wrong}" if wrong else text)
 
     def check_untouched(self) -> None:
         """Look for touches by the reference that the board has. Without one, or while somebody
@@ -124,6 +144,15 @@ class Device(CommandExchange):
         with self.asking:
             self.can_undo_tare = False
             self.command(commands.Tare(0), ANSWER_S)
+
+    def unserved(self) -> str | None:
+        """What of the skin source and amplifier do not serve, and which part to change; None:
+        nothing, or the board does not know. It takes a raw frame, unless somebody reads the
+        frames."""
+        if not self.board.gain_ppm or not self.reader.idle:
+            return None
+        raw = [item for item in self.stream(Stream.RAW, frames=3) if isinstance(item, RawFrame)]
+        return unserved(self.board, raw[-1]) if raw else None  # two were measured before
 
     def start_scene(self) -> int | None:
         """Begin what is to be touched, on a simulated or emulated board; call it after ``tare``.
@@ -230,20 +259,54 @@ class Device(CommandExchange):
         settings: Setting,
         current_limit_ua_rms: int | None = None,
         name: str | None = None,
+        source_ua: int | None = None,
+        gain: float | None = None,
     ) -> BoardInfo:
         """Give the board all of its owner's settings, which it keeps in flash; the current stops.
         The limit counts where a sense resistor is fitted; 0: 1.25 times what the source gives,
         None: as it is. ``name`` is the board's, in messages and topics; "": none, None: as it is.
+        ``source_ua``, the amplitude of the current source, and ``gain``, volts at the converter
+        per volt between the electrodes, are what its parts give; 0: as designed, None: as it is.
+        Others than before make the board forget its reference.
 
         Raises:
-            UsageError: the limit does not fit, or the name cannot be used.
+            UsageError: a number does not fit, or the name cannot be used.
             DeviceError: the board is locked and nobody holds its button, or keeps no settings.
         """
-        limit = commands.LIMIT_KEPT if current_limit_ua_rms is None else current_limit_ua_rms
+        limit = commands.KEPT if current_limit_ua_rms is None else current_limit_ua_rms
         with self.asking:
             named = self.board.name if name is None else name and check_name(name, "name")
-            self.command(commands.Settings(int(settings), limit, named), 10.0)
+            source = commands.KEPT if source_ua is None else source_ua
+            gain_ppm = commands.KEPT if gain is None else round(gain * 1e6)
+            wanted = commands.Settings(int(settings), limit, named, source, gain_ppm)
+            self.command(wanted, 10.0)
             return self.info()
+
+    def probe(
+        self,
+        joined: Sequence[int] | None,
+        *,
+        before: Sequence[int] | None = None,
+        settle_us: int = 1000,
+        samples: int = 1000,
+        generator: bool = True,
+    ) -> ProbedBurst:
+        """Take one burst of a fixed row: the converter's codes while ``joined`` (I+, I-, V+, V-;
+        None: all open) are connected, from ``settle_us`` after the switch from ``before`` on. The
+        scan waits meanwhile. Current flows if the ``generator`` runs.
+
+        Raises:
+            UsageError: an electrode is out of range.
+            DeviceError: the board cannot do it.
+        """
+        answer = self.ask(
+            commands.Probe(
+                _electrodes(before), _electrodes(joined), settle_us, samples, int(generator), 0
+            ),
+            ANSWER_S,
+        )
+        assert isinstance(answer, ProbedBurst)
+        return answer
 
     def clear_faults(self) -> None:
         """Forget the faults that the board has raised; those that persist rise again."""

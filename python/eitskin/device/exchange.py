@@ -23,7 +23,7 @@ from eitskin.device.transport import Transport
 from eitskin.device.wire.explain import command_name, reply_text
 from eitskin.device.wire.layout import Command
 from eitskin.device.wire.link_table import GetInfo, Keepalive, PacketType, ReplyStatus
-from eitskin.device.wire.packets import BoardHashes, BoardInfo, BoardStats, Reply
+from eitskin.device.wire.packets import BoardHashes, BoardInfo, BoardStats, ProbedBurst, Reply
 from eitskin.device.wire.sequence import LinkCounters
 from eitskin.errors import DeviceError, EitskinError, UsageError
 from eitskin.threads import OneReader, refuse_copy, within
@@ -32,6 +32,7 @@ ANSWERED_BY: dict[int, type] = {
     PacketType.GET_INFO: BoardInfo,
     PacketType.GET_STATS: BoardStats,
     PacketType.GET_HASHES: BoardHashes,
+    PacketType.PROBE: ProbedBurst,
 }
 
 Self = TypeVar("Self", bound="CommandExchange")

@@ -23,6 +23,7 @@ from eitskin.device.wire.packets import (
     DriveTouches,
     Fault,
     FrameEvents,
+    ProbedBurst,
     RawFrame,
     Reply,
     SolvedImage,
@@ -33,7 +34,7 @@ from eitskin.device.wire.sequence import LinkCounters
 from eitskin.errors import DeviceError, EitskinError
 from eitskin.threads import FairLock, within
 
-Answer = Reply | BoardInfo | BoardStats | BoardHashes
+Answer = Reply | BoardInfo | BoardStats | BoardHashes | ProbedBurst
 FramePart = RawFrame | SolvedImage | SolvedTouches | FrameEvents
 Streamed = FramePart | DriveTouches | Fault | LinkEvent
 ROOM = 1024

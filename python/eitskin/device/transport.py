@@ -124,6 +124,11 @@ class Transport(ABC):
         """The hashes of model and program that a recording keeps; None: ask the board."""
         return None
 
+    def connect(self, fixture: str) -> bool:
+        """Put a fixture of the bring-up ("nothing", "chain", "ring", "skin") on the electrodes;
+        False: somebody has to."""
+        return False
+
     def begin_scene(self) -> int | None:
         """Begin what is to be touched: until then a simulated skin is untouched. Returns the
         board's clock at the scene's time 0, in us; None: it is when the next scan begins, or the

@@ -147,7 +147,8 @@ def board_info(**changes: object) -> BoardInfo:
         "check_every": 1, "streaming": 0, "every": 1,
         "tared": 0, "frame_period_us": 0, "faults": 0, "volts_per_code_nv": 805664,
         "drive": 0, "settings": 0, "source_ua_rms": 350, "current_ua_rms": 0,
-        "current_limit_ua_rms": 437, "name": "left",
+        "current_limit_ua_rms": 437, "name": "left", "source_ua": 500, "gain_ppm": 3_000_000,
+        "button": 0, "reserved": 0,
     }  # fmt: skip
     return BoardInfo(**(values | changes))
 

@@ -9,7 +9,7 @@ import pytest
 from eitskin.cli.main import main
 from eitskin.device.client import Device
 from eitskin.device.open import open_device, open_with_files
-from eitskin.device.wire.link_table import LIMIT_KEPT, Drive, Setting, Settings
+from eitskin.device.wire.link_table import KEPT, Drive, Setting, Settings
 from eitskin.errors import DeviceError, UsageError
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.session.session import KEPT_ON, Session
@@ -50,7 +50,7 @@ def test_a_limit_that_is_not_named_stays(monkeypatch):
 
     monkeypatch.setattr("eitskin.cli.cmd_board.open_named", opened)
     assert main(["board", "--lock"]) == 0
-    assert given == [Settings(int(Setting.LOCKED), LIMIT_KEPT, "")]
+    assert given == [Settings(int(Setting.LOCKED), KEPT, "", KEPT, KEPT)]
     with open_device("sim:two_touch") as device:
         assert device.settings(Setting.SENSE, 400).current_limit_ua_rms == 400
         assert device.settings(Setting(0)).current_limit_ua_rms == 400

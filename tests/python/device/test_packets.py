@@ -136,10 +136,10 @@ def test_info_is_read_as_it_was_built():
 
 
 def test_info_grows_at_its_end():
-    """An older board has no name; a newer one sends more."""
+    """An older board has no name and does not know its source; a newer one sends more."""
     payload = pl.pack(board_info())
     older = pl.parse(link.PacketType.INFO, payload[: pl.OLDEST_INFO_BYTES])
-    assert older == board_info(name="")
+    assert older == board_info(name="", source_ua=0, gain_ppm=0)
     assert pl.parse(link.PacketType.INFO, payload + b"more") == board_info()
 
 

@@ -7,7 +7,7 @@ from thumb import flat_skin
 from eitskin.skin.protocol import adjacent, table
 from eitskin_emulator.analog.ad9833 import FULL_TURN, Ad9833
 from eitskin_emulator.analog.adg1206 import OFF_TICKS, Multiplexers
-from eitskin_emulator.analog.converter import STEP_V, codes
+from eitskin_emulator.analog.converter import CODE_V, STEP_V, codes
 from eitskin_emulator.analog.front_end import TAU_TICKS, FrontEnd
 from eitskin_emulator.analog.skin import AnalogSkin
 from eitskin_emulator.clocktime import TICKS_PER_S, TICKS_PER_US
@@ -178,6 +178,6 @@ def test_settling_is_first_order():
 
 
 def test_codes():
-    found = codes(np.array([0.0, STEP_V, -STEP_V, 0.49 * STEP_V, 1.2, -1.2])).tolist()
+    found = codes(np.array([0.0, CODE_V, -CODE_V, 0.49 * CODE_V, 1.8, -1.8])).tolist()
     assert found == [2048, 2049, 2047, 2048, 4095, 0]
     assert pytest.approx(3.3 / 4096 / 1.5) == STEP_V

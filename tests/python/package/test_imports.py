@@ -32,6 +32,7 @@ ORDER = (
     {"device"},
     {"teaching", "tuning"},
     {"session"},
+    {"bringup"},
     {"scoring"},
     {"truth", "demo"},
     {"view"},

@@ -55,6 +55,7 @@ class Ad9833:
 
     def __init__(self) -> None:
         self.mclk_hz = 0
+        self.oscillator_hz = 0  # of a module that has its own; 0: none
         self.words: list[int] = []
         self.ignored_bits = self.early_clocks = 0
         self._selected_at: int | None = None  # when FSYNC fell
@@ -131,6 +132,7 @@ class Ad9833:
 
     def set_mclk(self, at: int, hz: int) -> None:
         """MCLK changes; 0: it stands still."""
+        hz = self.oscillator_hz or hz
         if hz != self.mclk_hz:
             phase = self._accumulator(at)
             self.mclk_hz = hz

@@ -12,10 +12,11 @@ from eitskin.arrays import FloatArray
 
 REFERENCE_V = 3.3
 STEPS = 4096
-GAIN = 1.5
-STEP_V = REFERENCE_V / STEPS / GAIN  # of one code, at the electrodes
+CODE_V = REFERENCE_V / STEPS  # of one code, at the converter
+# at the electrodes by a model's 1 mA, with the source and gain as designed: 0.5 mA and 3
+STEP_V = CODE_V / 1.5
 
 
 def codes(v: FloatArray) -> npt.NDArray[np.uint16]:
-    """Codes (.,) of the voltages ``v`` (.,) between the electrodes."""
-    return np.clip(np.round(STEPS / 2 + v / STEP_V), 0, STEPS - 1).astype(np.uint16)
+    """Codes (.,) of the voltages ``v`` (.,) that the amplifier adds to half the reference."""
+    return np.clip(np.round(STEPS / 2 + v / CODE_V), 0, STEPS - 1).astype(np.uint16)

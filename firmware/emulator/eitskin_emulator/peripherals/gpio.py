@@ -46,6 +46,7 @@ class GpioPort(Registers):
         self.driven = self.levels = 0
         self._mode, self._outputs = -1, 0
         self.outside = 0  # pins that something outside lifts
+        self.lowered = 0  # pins that something outside pulls low, against a pull-up
 
     def reset(self) -> None:
         """As after a reset: all pins float."""
@@ -64,7 +65,8 @@ class GpioPort(Registers):
     def read(self, offset: int, size: int) -> int:
         if offset == IDR:
             pulled = sum(1 << pin for pin in range(16) if self.values[PUPDR] >> 2 * pin & 3 == 1)
-            return self.levels & self.driven | (pulled | self.outside) & ~self.driven
+            open_levels = (pulled | self.outside) & ~self.lowered
+            return self.levels & self.driven | open_levels & ~self.driven
         return 0 if offset == BSRR else super().read(offset, size)
 
     def write(self, offset: int, size: int, value: int) -> None:

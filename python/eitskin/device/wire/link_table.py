@@ -10,7 +10,8 @@ from eitskin.device.wire.layout import Command, Payload
 
 LINK_VERSION = 6
 LINK_MAX_PAYLOAD = 16384
-LIMIT_KEPT = 4294967295
+KEPT = 4294967295
+PROBE_OPEN = 4294967295
 FAULT_RAISE_FRAMES = 3
 FAULT_CLEAR_FRAMES = 8
 NAME_CHARACTERS = 32
@@ -50,6 +51,7 @@ class PacketType(IntEnum):
     STATS = 0x13  # the board's counters
     FAULT = 0x14  # a fault that rose or went
     HASHES = 0x16  # SHA-256 of the model and of the firmware
+    PROBED = 0x18  # codes of a fixed row
     RECORDING = 0x70  # never on a wire: the first packet of an .eits file
     GET_INFO = 0x80  # send an INFO
     STREAM = 0x81  # what to send of each frame
@@ -67,6 +69,7 @@ class PacketType(IntEnum):
     KEEPALIVE = 0x8D  # the host is there, or goes and the current stops; not answered
     SETTINGS = 0x8E  # the owner's settings, kept in flash
     GET_HASHES = 0x8F  # send HASHES
+    PROBE = 0x90  # measure a fixed row once and send PROBED
 
 
 class ReplyStatus(IntEnum):
@@ -152,6 +155,7 @@ class Setting(IntFlag):
     KEEP_CURRENT = 1  # current flows on where no host listens
     LOCKED = 2  # models, settings and lower excitations need the blue button
     SENSE = 4  # a sense resistor is fitted: the current is measured
+    BUTTON_LOW = 8  # the owner's button pulls its pin low, and does not lift it
 
 
 class RawFlags(IntFlag):
@@ -218,6 +222,11 @@ class InfoPacket(Payload, c="eits_packet_info"):
     current_ua_rms: U32  # as measured last; 0: there is no sense resistor, or no current
     current_limit_ua_rms: U32  # above which the drive goes off; 0: none
     name: Text32  # that the owner gave the board, zero-filled; empty: none
+    source_ua: U32  # amplitude of the current source; 0: not known
+    # volts at the converter per volt between the electrodes, in millionths; 0: not known
+    gain_ppm: U32
+    button: U32  # the level of the button's pin now; 2: there is none
+    reserved: U32  # 0
 
 
 @dataclass(frozen=True)
@@ -404,6 +413,17 @@ class HashesPacket(Payload, c="eits_packet_hashes"):
 
 
 @dataclass(frozen=True)
+class ProbedHead(Payload, c="eits_packet_probed"):
+    """A burst of a fixed row; then its samples, codes of the converter, u16 each."""
+
+    request: U32  # of the PROBE that asked
+    start_us: U32  # when the burst began, on the board's clock
+    switched_us: U32  # when its electrodes had been joined
+    samples: U16  # that follow
+    lost: U16  # 1: the converter lost samples
+
+
+@dataclass(frozen=True)
 class GetInfo(Command, c="eits_command_plain", kind=PacketType.GET_INFO):
     """send an INFO"""
 
@@ -523,8 +543,26 @@ class Settings(Command, c="eits_command_settings", kind=PacketType.SETTINGS):
     # at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1: as it is
     current_limit_ua_rms: U32
     name: Text32  # letters, digits, - and _, the first a letter or digit; zero-filled; empty: none
+    # amplitude of the current source as fitted, 10 to 7,000; 0: as designed; 2^32 - 1: as it is
+    source_ua: U32
+    # from electrodes to converter as fitted, 10,000 to 400,000,000; 0: as designed; 2^32 - 1: as it
+    # is
+    gain_ppm: U32
 
 
 @dataclass(frozen=True)
 class GetHashes(Command, c="eits_command_plain", kind=PacketType.GET_HASHES):
     """send HASHES"""
+
+
+@dataclass(frozen=True)
+class Probe(Command, c="eits_command_probe", kind=PacketType.PROBE):
+    """measure a fixed row once and send PROBED"""
+
+    # electrodes of I+, I-, V+, V- of 8 bits each, the first one lowest; 2^32 - 1: all open
+    before: U32
+    joined: U32  # the same of the burst that is sent
+    settle_us: U16  # from the switch to the burst's first sample, at least; at most 50,000
+    samples: U16  # 4 to 1024; those of SCAN's rate
+    generator: One  # 1: it runs; 0: it is in reset
+    reserved: U16  # 0

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eitskin.arrays import IntArray
 from eitskin.core.diagnostics import names, words
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.gestures import GestureEvent
@@ -61,6 +62,11 @@ class BoardInfo(InfoPacket):
         phases = np.float32(self.samples // math.gcd(self.samples, periods))
         step_nv = np.float32(self.volts_per_code_nv)
         return float(np.sqrt(step_nv * step_nv / (np.float32(6) * phases)) * np.float32(1e-9))
+
+    @property
+    def gain(self) -> float:
+        """Volts at the converter per volt between the electrodes; 0: not known."""
+        return self.gain_ppm / 1e6
 
     @property
     def frames_given(self) -> bool:
@@ -208,6 +214,18 @@ class BoardStats(StatsPacket):
         return asdict(self)
 
 
+@dataclass(frozen=True, eq=False)
+class ProbedBurst:
+    """A burst of a fixed row: its ``codes`` (n,), from ``start_us`` on; its electrodes had been
+    joined at ``switched_us``."""
+
+    request: int
+    start_us: int
+    switched_us: int
+    lost: bool
+    codes: IntArray
+
+
 @dataclass(frozen=True)
 class Fault(FaultPacket):
     """A fault that rose or went; ``explain.fault_text`` puts it in words."""
@@ -216,6 +234,7 @@ class Fault(FaultPacket):
 FromBoard = (
     BoardInfo
     | BoardHashes
+    | ProbedBurst
     | Reply
     | RawFrame
     | SolvedImage

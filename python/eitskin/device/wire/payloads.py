@@ -20,6 +20,7 @@ from eitskin.device.wire.link_table import (
     EventPacket,
     EventsHead,
     PacketType,
+    ProbedHead,
     RawHead,
     StageStats,
     TouchPacket,
@@ -32,6 +33,7 @@ from eitskin.device.wire.packets import (
     Fault,
     FrameEvents,
     FromBoard,
+    ProbedBurst,
     RawFrame,
     Reply,
     Solved,
@@ -146,6 +148,13 @@ def parse_raw(payload: bytes) -> RawFrame:
     return RawFrame(head.frame, head.time_us, head.scan_us, head.flags, volts, quality)
 
 
+def parse_probed(payload: bytes) -> ProbedBurst:
+    head = unpack(ProbedHead, payload, "PROBED", more=True)
+    _check_rest(payload, head, 2 * head.samples, "PROBED")
+    codes = np.frombuffer(payload, dtype="<u2", offset=head.LAYOUT.size).astype(np.int64)
+    return ProbedBurst(head.request, head.start_us, head.switched_us, bool(head.lost), codes)
+
+
 def parse_image(payload: bytes) -> SolvedImage:
     solved = unpack(Solved, payload, "IMAGE", more=True)
     _check_rest(payload, solved, 4 * solved.count, "IMAGE")
@@ -209,6 +218,7 @@ _PARSERS: dict[int, Callable[[bytes], FromBoard]] = {
     PacketType.EVENTS: parse_events,
     PacketType.DRIVE_TOUCHES: parse_drive_touches,
     PacketType.STATS: lambda payload: unpack(BoardStats, payload, "STATS"),
+    PacketType.PROBED: parse_probed,
     PacketType.HASHES: lambda payload: unpack(BoardHashes, payload, "HASHES"),
     PacketType.FAULT: lambda payload: unpack(Fault, payload, "FAULT"),
 }

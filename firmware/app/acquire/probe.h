@@ -1,0 +1,41 @@
+/* One burst of the converter's codes for a fixed row: what bring-up and a maker look at. The first
+ * of two bursts is taken of the electrodes before, the second one of those that are joined then, so
+ * that its first samples show how they settle. */
+#ifndef FW_PROBE_H
+#define FW_PROBE_H
+
+#include "app/acquire/frame.h"
+#include "drivers/adg1206.h"
+#include "hal/hal.h"
+
+typedef struct fw_probe_setup {
+    fw_scan_settings settings; /* rate, samples, settling */
+    uint32_t before, joined;   /* address lines of the multiplexers, or FW_PROBE_OPEN */
+    bool generator;            /* it runs; otherwise it is in reset */
+} fw_probe_setup;
+#define FW_PROBE_OPEN 0xFFFFFFFFu
+
+typedef struct fw_probe {
+    fw_probe_setup setup;
+    fw_adg1206 mux;
+    const fw_board *board;
+    volatile uint32_t state;
+    uint32_t began_us;
+    uint32_t start_us;    /* of the second burst */
+    uint32_t switched_us; /* when its electrodes were joined */
+    bool lost;
+    uint16_t codes[FW_MAX_SAMPLES];
+} fw_probe;
+
+/* The generator, as it should be, and nothing else must be running. Errors: those of the lines and
+ * the capture; all electrodes are open then. */
+fw_status fw_probe_start(fw_probe *probe, const fw_board *board, const fw_probe_setup *setup);
+
+/* Open the electrodes; nothing is measured any more. */
+void fw_probe_stop(fw_probe *probe);
+
+/* Whether it is under way, and whether the codes are there. */
+bool fw_probe_active(const fw_probe *probe);
+bool fw_probe_done(const fw_probe *probe);
+
+#endif

@@ -1,0 +1,1 @@
+"""The first measurements on an instrument that somebody has built, stage by stage."""
