@@ -22,7 +22,7 @@ LONGEST = (
     "solve/test_reconstructor.py", "model/test_model_errors.py", "teaching/test_update.py",
     "hard_cases/test_columns.py", "model/test_build.py", "fem/test_cem.py",
     "cli/test_cli_model.py", "fem/test_mesh.py", "frames/test_doctor.py",
-    "emulator/test_emulated_board.py",
+    "emulator/test_emulated_board.py", "hardware/test_spice.py", "hardware/test_stages.py",
 )  # fmt: skip
 NEEDED = ("matplotlib", "netgen", "scipy", "skfem", "sklearn", "unicorn")
 
