@@ -106,6 +106,61 @@ TEST(test_tare_ranges)
         REPLY(scan_with(s), EITS_REPLY_##status, a, c); \
     } while (0)
 
+/* A fixed row: its burst comes after that of the row before, and frames go on afterwards.
+ * Electrodes that cannot be joined, and numbers out of range, are refused. */
+TEST(test_probe)
+{
+    STREAM(EITS_STREAM_RAW, 1, 0);
+    eits_command_probe c = {.before = EITS_PROBE_OPEN,
+                            .joined = 0x03020001u,
+                            .settle_us = 20,
+                            .samples = 100,
+                            .generator = 1};
+    host_forget(&b.host);
+    c.request = 700;
+    host_send(&b.host, EITS_PACKET_PROBE, &c, sizeof c);
+    host_run(&b.host, 50);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_PROBED), 1);
+    const host_packet *packet = host_last(&b.host, EITS_PACKET_PROBED);
+    eits_packet_probed head;
+    memcpy(&head, packet->payload, sizeof head);
+    CHECK_EQUAL(head.request, 700);
+    CHECK_EQUAL(head.samples, 100);
+    CHECK_EQUAL(packet->size, sizeof head + 200);
+    CHECK_EQUAL(head.lost, 0);
+    CHECK(head.start_us - head.switched_us >= 20 && head.start_us - head.switched_us <= 24);
+    uint16_t low = UINT16_MAX, high = 0;
+    for (uint32_t k = 0; k < 100; ++k) {
+        uint16_t code;
+        memcpy(&code, packet->payload + sizeof head + 2 * (size_t)k, sizeof code);
+        low = code < low ? code : low;
+        high = code > high ? code : high;
+    }
+    CHECK(high - low > 100 && low < 2048 && high > 2048); /* a sine about the middle */
+    hear(100);
+    CHECK(host_count(&b.host, EITS_PACKET_RAW) > 1);
+    CHECK(b.board.monitor.violation == NULL);
+    const struct {
+        uint32_t before, joined, settle_us, samples, generator;
+        int32_t offset;
+    } refused[] = {
+        {0x03020000u, 0x03020001u, 20, 100, 1, 4},     {0x03020001u, 0x03020010u, 20, 100, 1, 8},
+        {0x03020001u, 0x03020001u, 50001, 100, 1, 12}, {0x03020001u, 0x03020001u, 20, 3, 1, 14},
+        {0x03020001u, 0x03020001u, 20, 1025, 1, 14},   {0x03020001u, 0x03020001u, 20, 100, 2, 16}};
+    for (size_t k = 0; IN_TABLE(k, refused); ++k) {
+        eits_command_probe bad = {0,
+                                  refused[k].before,
+                                  refused[k].joined,
+                                  (uint16_t)refused[k].settle_us,
+                                  (uint16_t)refused[k].samples,
+                                  (uint16_t)refused[k].generator,
+                                  0};
+        const eits_packet_reply reply = host_command(&b.host, EITS_PACKET_PROBE, &bad, sizeof bad);
+        CHECK_EQUAL(reply.status, EITS_REPLY_RANGE);
+        CHECK_EQUAL(reply.detail[0], refused[k].offset);
+    }
+}
+
 TEST(test_scan_ranges)
 {
     SCAN(s.excitation_millihz = 3499999, RANGE, 4, 3500000); /* at 350 uA rms */
