@@ -540,5 +540,6 @@ int small_same_touch(const eits_touch *a, const eits_touch *b)
            a->explained == b->explained && a->force_n == b->force_n &&
            a->confidence == b->confidence && a->x_variance_mm2 == b->x_variance_mm2 &&
            a->xy_covariance_mm2 == b->xy_covariance_mm2 && a->y_variance_mm2 == b->y_variance_mm2 &&
-           a->long_x_mm == b->long_x_mm && a->long_y_mm == b->long_y_mm;
+           a->long_x_mm == b->long_x_mm && a->long_y_mm == b->long_y_mm &&
+           a->radius_sd_mm == b->radius_sd_mm;
 }

@@ -149,6 +149,7 @@ void fuzz_check_touches(const eits_context *ctx, const eits_touch *touches, uint
         MUST(eits_is_finite(t->x_variance_mm2) && t->x_variance_mm2 >= 0);
         MUST(eits_is_finite(t->y_variance_mm2) && t->y_variance_mm2 >= 0);
         MUST(eits_is_finite(t->long_x_mm) && eits_is_finite(t->long_y_mm));
+        MUST(eits_is_finite(t->radius_sd_mm) && t->radius_sd_mm >= 0);
         MUST(eits_is_finite(t->xy_covariance_mm2));
         MUST(t->id != 0);
         for (uint32_t l = 0; l < k; ++l)

@@ -193,7 +193,8 @@ static void check_touches(const eits_touch *touches, uint32_t count)
                                      t->xy_covariance_mm2,
                                      t->y_variance_mm2,
                                      t->long_x_mm,
-                                     t->long_y_mm};
+                                     t->long_y_mm,
+                                     t->radius_sd_mm};
         crc = eits_crc32(crc, &t->id, sizeof t->id);
         crc = eits_crc32(crc, numbers, sizeof numbers);
     }
