@@ -51,10 +51,10 @@ def test_the_rules_check_names_what_is_broken(monkeypatch, breaks, named):
         breaks(b)
 
     monkeypatch.setattr(circuit, "_sense", broken)
-    messages = check().messages
-    assert any(named in message for message in messages), messages
+    checked = check()
+    assert any(named in message for message in checked.messages), checked.messages
     with pytest.raises(make.RulesError, match="electrical rules"):
-        make.refuse_broken(check())
+        make.refuse_broken(checked)
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,10 @@ def dish_volume(container, perimeter_mm, area_mm2):
     return floor + wall * (container.height_mm - container.floor_mm) - holes
 
 
-@pytest.mark.parametrize("skin", [paper_skin(), RECTANGLE], ids=["paper", "rectangle"])
+PAPER = pytest.param(paper_skin(), marks=pytest.mark.long("the rectangle"), id="paper")
+
+
+@pytest.mark.parametrize("skin", [PAPER, pytest.param(RECTANGLE, id="rectangle")])
 def test_the_dish_is_a_closed_body_of_the_right_volume(tmp_path, skin):
     container = container_of(skin)
     write_scad(container, tmp_path)
