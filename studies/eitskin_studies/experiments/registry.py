@@ -47,6 +47,10 @@ EXPERIMENTS = {
     "fast-path": (
         "touches after each drive, while they land, move and lift: false ones, delay, error"
     ),
+    "hands": (
+        "hands in time before a simulated board: false touches, delay, error and diagnostics while"
+        " one to five fingers land, slide and lift"
+    ),
     "constants": (
         "each constant of the core halved and doubled: which judging scenes change, and by how much"
     ),
