@@ -55,6 +55,10 @@
  * or warm up are refused */
 #define EITS_MOVED_FRACTION R(0.001)
 
+/* and so much [of the option noise_floor_v]. larger: light touches go unnoticed; smaller: rounding
+ * without noise is taken for a touch */
+#define EITS_MOVED_STEPS R(4.0)
+
 /* ---- Chosen: guards: a touch changes a row by less. Study constants: MAX_RATIO changes 6 scenes
  * with faults and no exact frame, RATIO_DEFINED nothing. Check: ctest --preset host -R frame_f */
 

@@ -355,7 +355,12 @@ int eits_reference_moved(const eits_context *ctx)
         return 0;
     /* Each energy is that of `pairs` normal numbers: its relative deviation is sqrt(2 / pairs), and
      * that of the ratio sqrt(4 / pairs). */
-    const eits_real limit = 1 + EITS_MOVED_DEVIATIONS * 2 / eits_sqrt((eits_real)still->pairs),
-                    min = EITS_MOVED_FRACTION * EITS_MOVED_FRACTION * still->size;
-    return still->common > limit * still->apart && still->common - still->apart > min;
+    const eits_real pairs = (eits_real)still->pairs,
+                    limit = 1 + EITS_MOVED_DEVIATIONS * 2 / eits_sqrt(pairs),
+                    fraction = EITS_MOVED_FRACTION * EITS_MOVED_FRACTION * still->size;
+    /* Without noise a converter rounds a row and its reciprocal alike. */
+    const eits_real step = EITS_MOVED_STEPS * ctx->options.noise_floor_v / ctx->reference.m2_unit,
+                    rounding = step * step * pairs;
+    return still->common > limit * still->apart &&
+           still->common - still->apart > eits_larger(fraction, rounding);
 }
