@@ -127,8 +127,8 @@ def test_findings_are_said_once_they_rise_and_stand_in_each_frame(scene, ran):
     shown = [f["frame"] for f in frames if "stale reference" in f["info"]["diagnostics"]]
     assert len(shown) > 3
     assert [line for line in err.splitlines() if "stale reference" in line] == [
-        f"eitskin: stale reference, frame {shown[2]}: the skin has changed since it was taken;"
-        " leave it untouched and run  eitskin tare"
+        f"eitskin: stale reference, frame {shown[2]}: the skin was touched while it was taken, or"
+        " has changed since; leave it untouched and run  eitskin tare"
     ]
     assert "stale" not in "".join(ran(0, command, "--ignore stale-reference,crowded"))
     assert "--ignore stale: " in ran(2, command, "--ignore stale")[1]

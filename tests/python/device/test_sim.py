@@ -135,7 +135,7 @@ def test_masked_rows_are_left_out():
         assert image.solved.masked == 1
         assert np.isfinite(image.image).all()
         device.mask_row(5, masked=False)
-        device.tare(4)
+        device.tare(4, anyway=True)
         assert of(SolvedImage, device.stream(ALL, frames=1))[0].solved.masked == 0
 
 

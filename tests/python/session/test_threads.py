@@ -290,7 +290,7 @@ def test_two_threads_may_start_a_session():
     ):
         asked: list[int] = []
         tare = one.device.tare
-        one.device.tare = lambda frames: (asked.append(frames), tare(frames))  # type: ignore
+        one.device.tare = lambda frames, **how: (asked.append(frames), tare(frames, **how))  # type: ignore
         list(pool.map(lambda _: one.start(), range(2)))
         tares = len(asked)
     assert tares == 1
