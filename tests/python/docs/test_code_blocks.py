@@ -69,22 +69,6 @@ def test_pages_link_to_files_that_exist():
             assert there, f"{page.relative_to(ROOT)} links to {target}, which is not there"
 
 
-def test_pages_reach_the_studies_through_one_page():
-    """The README and the docs link to studies/results/README.md, at a place that it has; only
-    pictures are shown from beside it."""
-    results = ROOT / "studies" / "results"
-    places = re.findall(r'<a id="([\w-]+)">', (results / "README.md").read_text(encoding="utf-8"))
-    for page in [ROOT / "README.md", *ROOT.glob("docs/**/*.md")]:
-        for target in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
-            name, _, place = target.partition("#")
-            file = (page.parent / name).resolve()
-            if "://" in target or ROOT / "studies" not in file.parents or file.suffix == ".png":
-                continue
-            at = f"{page.relative_to(ROOT)} links to {target}"
-            assert file == results / "README.md", f"{at}; link to studies/results/README.md"
-            assert not place or place in places, f"{at}; no such place"
-
-
 def test_paths_that_pages_name_exist():
     """Files and folders of the tree, but for those with a placeholder in capitals."""
     named = re.compile(
