@@ -118,8 +118,8 @@ def advice(demand: Demand) -> list[str]:
         lines.append(f"better           {_described(demand, better)}")
         lines.append(
             f"                 source resistor {source_ohm:,.0f} ohm, {resistor};"
-            f" FRONT_END_GAIN_PPM {better.gain_ppm}, SOURCE_UA_RMS"
-            f" {round(better.current_a / 2**0.5 * 1e6)} in the board's file"
+            f"  eitskin board --gain {better.gain:.4g} --source-ua"
+            f" {round(better.current_a * 1e6)}"
         )
         if not demand.suits(better):
             lines.append(

@@ -93,8 +93,8 @@ ADVICE = {
             "0.5 mA, gain 3: source 100 of 24 V, converter 15 of 1.65 V: unsuited",
             # 24 V / 200 kohm = 0.12 mA, so 1 V / 9.1 kohm; 1.2375 V / (0.11 mA 10 kohm) = 1.13
             "0.11 mA, gain 1.13: source 22 of 24 V, converter 1.24 of 1.65 V",
-            "source resistor 9,100 ohm, R_G 71,403 ohm; FRONT_END_GAIN_PPM 123750,"
-            " SOURCE_UA_RMS 78 in the board's file",
+            "source resistor 9,100 ohm, R_G 71,403 ohm;  eitskin board --gain 1.126"
+            " --source-ua 110",
         ],
     ),
     "less than the receiver's gain of 1": (
@@ -102,8 +102,7 @@ ADVICE = {
         [
             "0.5 mA, gain 3: source 100 of 24 V, converter 90 of 1.65 V: unsuited",
             "0.0196 mA, gain 1: source 3.92 of 24 V, converter 1.18 of 1.65 V",
-            "source resistor 51,000 ohm, no R_G; FRONT_END_GAIN_PPM 19608,"
-            " SOURCE_UA_RMS 14 in the board's file",
+            "source resistor 51,000 ohm, no R_G;  eitskin board --gain 1 --source-ua 20",
         ],
     ),
     "hardly anything at the greatest current and gain": (
@@ -111,8 +110,7 @@ ADVICE = {
         [
             "0.5 mA, gain 3: source 0.125 of 24 V, converter 0.00015 of 1.65 V: unsuited",
             "6.67 mA, gain 100: source 1.67 of 24 V, converter 0.0667 of 1.65 V",
-            "source resistor 150 ohm, R_G 99 ohm; FRONT_END_GAIN_PPM 666666667,"
-            " SOURCE_UA_RMS 4714 in the board's file",
+            "source resistor 150 ohm, R_G 99 ohm;  eitskin board --gain 100 --source-ua 6667",
             "even so the converter is hardly used or clips: change the skin's conductivity or"
             " thickness, or the protocol",
         ],
