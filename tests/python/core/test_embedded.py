@@ -11,7 +11,12 @@ from pathlib import Path
 import pytest
 from build_tools import ROOT, run, tool
 
+from eitskin.model.options import default_options
+from eitskin.model.prebuilt import load_prebuilt
+from eitskin_emulator.core_on_qemu import run_steps
+from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
 from frames_of_programs import assert_the_bits_of_the_host
+from small_models import session
 
 PROGRAM = ROOT / "tests" / "emulated" / "frames_m7.c"
 MODEL = ROOT / "python" / "eitskin" / "model" / "paper.eitm"
@@ -152,6 +157,66 @@ def test_every_file_compiles_as_in_a_sketch(made, tmp_path):
         run(tool("arm-none-eabi-gcc"), *flags, "-c", path, "-o", objects[-1])
     names = run("arm-none-eabi-nm", *objects)
     assert re.search(r" [RrDd] eits_kernels_m7", names)
+
+
+MPS2 = ROOT / "firmware" / "boards" / "mps2_an500"
+SEMIHOSTING = ["-nographic", "-monitor", "none", "-semihosting-config", "enable=on,target=native"]
+BARE = ["-O3", *LIKE_ARDUINO[1:], "-fdata-sections", "-Wl,--gc-sections"]
+
+
+def on_arm(machine: str) -> list[str]:
+    return ["qemu-system-arm", "-M", machine, *SEMIHOSTING]
+
+
+# standard output is standard error's under QEMU's RISC-V semihosting
+ON_RV32 = ["sh", "-c", '"$@" 2>&1', "x", "qemu-system-riscv32", "-M", "virt", "-bios", "none"]
+ON_RV32 += ["-m", "64M", *SEMIHOSTING]
+RV32_MEMORY = {"flash": 0x80000000, "flash_size": 0x400000, "ram": 0x80400000,
+               "ram_size": 0x1000000}  # fmt: skip
+RV32_LINKED = [*RV32, "--oslib=semihost", "--crt0=hosted"]
+RV32_LINKED += [f"-Wl,--defsym=__{name}={value}" for name, value in RV32_MEMORY.items()]
+M7 = ["-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard", "-mfp16-format=ieee"]
+PROCESSORS = {
+    "cortex-m4f": ("arm-none-eabi-gcc", M4F, on_arm("mps2-an386"), "cortex-m7"),
+    "cortex-m7": ("arm-none-eabi-gcc", M7, on_arm("mps2-an500"), "cortex-m7"),
+    "cortex-m33": ("arm-none-eabi-gcc", M33, on_arm("mps2-an505"), "cortex-m7"),
+    "rv32imafc": ("riscv64-unknown-elf-gcc", RV32_LINKED, ON_RV32, "portable"),
+    "aarch64": ("aarch64-linux-gnu-gcc", ["-static"], ["qemu-aarch64"], "portable"),
+    "x86-64": ("gcc", ["-static"], ["qemu-x86_64", "-cpu", "max"], "portable"),
+}
+
+
+@pytest.mark.long("test_one_file_gives_the_bits_of_the_library")
+@pytest.mark.parametrize("processor", PROCESSORS)
+def test_the_package_gives_the_bits_and_costs(processor, made, tmp_path):
+    """Prints the instructions per frame that stand in docs/guide/embedding.md: those of ten frames
+    more (pytest -rP)."""
+    compiler, flags, emulator, kernels = PROCESSORS[processor]
+    source, program = made / "eitskin" / "src", tmp_path / "frames"
+    files = [*source.glob("**/*.c"), PROGRAM]
+    if compiler == "arm-none-eabi-gcc":
+        script = (MPS2 / "mps2_an500.ld").read_text()
+        if processor == "cortex-m33":  # whose secure memory is elsewhere
+            script = script.replace("0x00000000, LENGTH", "0x10000000, LENGTH")
+            script = script.replace("0x20000000, LENGTH = 4M", "0x80000000, LENGTH = 16M")
+        (tmp_path / "memory.ld").write_text(script)
+        files.append(MPS2 / "startup.c")
+        flags = [*flags, "-nostartfiles", "--specs=rdimon.specs", f"-T{tmp_path / 'memory.ld'}"]
+    run(tool(compiler), *flags, *BARE, f"-I{source}", *files, "-lm", "-o", program)
+    plugin = tmp_path / "libcount.so"
+    run("gcc", "-shared", "-fPIC", ROOT / "tests" / "tools" / "count_plugin.c", "-o", plugin)
+    counted = [*emulator, "-plugin", str(plugin)]
+    counted += ["-kernel"] if "qemu-system" in " ".join(emulator) else []
+    assert_the_bits_of_the_host(program, tmp_path, counted, kernels)
+    model, blob = load_prebuilt()
+    frames, untouched = session().frames_v[:12], session().untouched_v[:16]
+    totals = []
+    for count in (2, 12):
+        steps = (Load(blob), Choose(default_options(model)), TareStep(untouched))
+        run_steps(program, tmp_path, (*steps, Play(frames[:count])), emulator=counted)
+        totals.append(int((tmp_path / "count.txt").read_text()))
+    print(f"{processor}: {(totals[1] - totals[0]) / 10:.0f} instructions per frame")
+    assert totals[1] - totals[0] > 1_000_000
 
 
 def test_it_writes_over_nothing(made):
