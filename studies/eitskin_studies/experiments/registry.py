@@ -26,6 +26,10 @@ EXPERIMENTS = {
         "drive patterns on 16 electrodes, where noise comes in volts, from the converter, or both,"
         " with one gain or a gain per row"
     ),
+    "models": (
+        "weights in fewer bits, 8 and 32 electrodes, a rectangle, a model taught from presses: each"
+        " with its own numbers"
+    ),
     "shapes": "a rounded rectangle, a forearm and a hand outline",
     "tank": "measured frames of water tanks, every method, plain and normalised difference",
     "other-worlds": (
