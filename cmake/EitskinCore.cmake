@@ -10,7 +10,7 @@ set(EITSKIN_CORE_SOURCES
     context/projection.c context/places.c frame/reference.c frame/places.c frame/fold.c frame/regularisation.c frame/whitening.c
     frame/whitening_products.c frame/rows_out.c frame/reference_tracking.c
     diagnostics/electrodes.c diagnostics/outliers.c diagnostics/model_mismatch.c
-    diagnostics/crowded.c diagnostics/reference_outliers.c
+    diagnostics/crowded.c diagnostics/reference_outliers.c diagnostics/second_moment.c
     solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c
     solve/active_set.c solve/violations.c solve/active_columns.c
     touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c touch/seek.c

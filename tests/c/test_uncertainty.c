@@ -5,6 +5,7 @@
 #include "small_model.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 enum { RANK = 4, PACKED = RANK * (RANK + 1) / 2, HEAD = 16, SIZE = HEAD + 2 * PACKED * 4 };
 
@@ -124,8 +125,60 @@ static void what_the_reference_tells_of_places_is_read_or_refused(void)
     small_model_free(&bare);
 }
 
+static eits_status begun(const uint8_t *bytes)
+{
+    small_model bare = small_model_make(WHITENED),
+                made = small_model_with_section(&bare, "UNCE", bytes, SIZE);
+    eits_model model;
+    CHECK_EQUAL(eits_model_open(&model, made.blob, made.size), EITS_OK);
+    const size_t size = eits_workspace_size(&model, 0), whole = (size + 63u) & ~(size_t)63u;
+    void *workspace = aligned_alloc(64, whole);
+    eits_context *ctx = NULL;
+    const eits_status status = eits_init(workspace, size, &model, &ctx);
+    CHECK((status == EITS_OK) == (ctx != NULL));
+    free(workspace);
+    small_model_free(&bare);
+    small_model_free(&made);
+    return status;
+}
+
+/* Either matrix with diagonal elements d and others c d: of rank 4 its eigenvalues are d (1 - c)
+ * and d (1 + 3 c). */
+static void what_is_no_covariance_is_refused(void)
+{
+    const struct {
+        float diagonal, other;
+        eits_status status;
+    } cases[] = {{1, 0, EITS_OK},
+                 {1, 1, EITS_OK}, /* one direction alone */
+                 {1e-20f, 1, EITS_OK},
+                 {1e20f, 0.99f, EITS_OK},
+                 {0, 0, EITS_OK},
+                 {1, -1.0f / 3, EITS_OK},
+                 {1, -0.34f, EITS_E_MODEL_VALUE}, /* each pair alone could be one */
+                 {1e-20f, -0.4f, EITS_E_MODEL_VALUE},
+                 {1, 1.1f, EITS_E_MODEL_VALUE},
+                 {1e20f, -1.1f, EITS_E_MODEL_VALUE}};
+    uint8_t bytes[SIZE];
+    for (size_t k = 0; k < 2 * sizeof cases / sizeof cases[0]; ++k) {
+        section_of(bytes);
+        const uint32_t from = HEAD + (k % 2 == 0 ? 0u : 4u * PACKED);
+        for (uint32_t i = 0; i < RANK; ++i) {
+            for (uint32_t j = 0; j <= i; ++j)
+                small_put_f32(bytes + from + 4 * (i * (i + 1) / 2 + j),
+                              cases[k / 2].diagonal * (i == j ? 1 : cases[k / 2].other));
+        }
+        CHECK_EQUAL(begun(bytes), cases[k / 2].status);
+    }
+    section_of(bytes);
+    small_put_f32(bytes + HEAD, 0);
+    small_put_f32(bytes + HEAD + 4, 0.1f); /* of a variance of 0 */
+    CHECK_EQUAL(begun(bytes), EITS_E_MODEL_VALUE);
+}
+
 int main(void)
 {
+    what_is_no_covariance_is_refused();
     what_the_reference_tells_of_places_is_read_or_refused();
     it_is_read_in_place();
     what_is_no_second_moment_is_refused();

@@ -38,8 +38,12 @@ static void use(const eits_model *model)
     if (size > FUZZ_WORKSPACE || model->n_rows > MAX_ROWS || work > MAX_WORK)
         return;
     const int prepared = model->meta_size % 2 == 0;
-    MUST(eits_init(fuzz_workspace(0), prepared ? size : eits_workspace_size(model, 0), model,
-                   &ctx) == EITS_OK);
+    const eits_status begun =
+        eits_init(fuzz_workspace(0), prepared ? size : eits_workspace_size(model, 0), model, &ctx);
+    /* a section UNCE that is no covariance */
+    MUST(begun == EITS_OK || (begun == EITS_E_MODEL_VALUE && model->uncertainty.errors != NULL));
+    if (begun != EITS_OK)
+        return;
     MUST(eits_options_default(model, &options) == EITS_OK);
     MUST(eits_set_options(ctx, &options) == EITS_OK); /* its own defaults are always good ones */
     if (options.iterations <= MAX_ITERATIONS) {

@@ -64,9 +64,9 @@ size_t eits_workspace_size(const eits_model *model, int prepared);
  * `workspace` starts at a multiple of 16 bytes; it and `model` must stay as long as the context is
  * used. If `size` is at least eits_workspace_size(model, 1), S is also copied into panels, which is
  * faster and gives the same bits. Errors: EITS_E_ARGUMENT, EITS_E_WORKSPACE (smaller than
- * eits_workspace_size(model, 0), or not aligned); *ctx is then unchanged. EITS_E_ARITHMETIC: the
- * library was compiled in a way that changes bits; the context works, but its results are only
- * close to those of other builds. */
+ * eits_workspace_size(model, 0), or not aligned), EITS_E_MODEL_VALUE (a matrix of section UNCE is
+ * no covariance); *ctx is then unchanged. EITS_E_ARITHMETIC: the library was compiled in a way that
+ * changes bits; the context works, but its results are only close to those of other builds. */
 eits_status eits_init(void *workspace, size_t size, const eits_model *model, eits_context **ctx);
 
 /* Replace the options. Errors: EITS_E_ARGUMENT if one is out of range or not finite; then none is

@@ -118,6 +118,10 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
     /* The size of the memory decides and not a flag: the caller chose by giving that size. */
     if (size >= eits_workspace_size(model, 1))
         lay_out_panels(made, &next);
+    const float *errors = model->uncertainty.errors, *drift = model->uncertainty.drift;
+    if (errors != NULL && (!eits_is_covariance(made, &made->scratch, errors) ||
+                           !eits_is_covariance(made, &made->scratch, drift)))
+        return EITS_E_MODEL_VALUE;
     eits_learn_range(made);
     eits_whitening_init(made, &made->scratch);
     /* The above is learned from the model once, since the model does not change. */

@@ -213,6 +213,13 @@
  * pass; smaller: noise is a crowd */
 #define EITS_CROWD_FAINT R(3.0)
 
+/* ---- Chosen: by hand: well above float32 rounding, which was not measured at high ranks. Check:
+ * ctest --preset host -R uncertainty */
+
+/* a matrix of section UNCE that is negative by less counts as a covariance [of a diagonal element].
+ * larger: damaged models are used; smaller: rounding refuses good ones */
+#define EITS_SECOND_MOMENT_ROUNDING R(0.0001)
+
 /* ---- Chosen: mathematics: the deviation of a normal distribution over the median of its
  * magnitudes. Check: ctest --preset host -R outliers */
 

@@ -101,6 +101,10 @@ int eits_is_faint(const eits_context *ctx);
 /* Set CROWDED if `count` touches are more than can be separated. info.unexplained must be known. */
 void eits_check_crowd(eits_context *ctx, const eits_touch *touches, uint32_t count);
 
+/* second_moment.c: whether a lower triangle of section UNCE is positive semidefinite, to rounding.
+ * Overwrites the scratch's square and row 5. */
+int eits_is_covariance(const eits_context *ctx, const eits_scratch *scratch, const float *triangle);
+
 /* The k-th smallest of n numbers. Changes their order. */
 eits_real eits_kth(eits_real *v, uint32_t n, uint32_t k);
 

@@ -2,8 +2,7 @@
  *
  * The section's bytes are used in place, by pointers into them. Both triangles are second moments,
  * so a diagonal below zero shows a damaged or invented file. Whether they are positive semidefinite
- * is not checked here, since the code that uses them (evidence/covariance.c) adds noise and limits
- * its pivots from below. */
+ * is checked by eits_init, which has the memory for it (diagnostics/second_moment.c). */
 #include "base/arithmetic.h"
 #include "model/sections.h"
 

@@ -84,6 +84,8 @@ class CoreEngine:
         status = self._lib.eits_init(
             self._ffi.from_buffer(self._workspace), self.workspace_bytes, self._model, context
         )
+        if status == self._lib.EITS_E_MODEL_VALUE:
+            self._check(status, "model", ModelError)
         self._check(status, "workspace", UsageError)
         self._context = context[0]
         self._lib.eits_use_portable_kernels(self._context, int(portable))

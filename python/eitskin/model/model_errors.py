@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eitskin.arrays import FloatArray
+from eitskin.core.constants_table import SECOND_MOMENT_ROUNDING
 from eitskin.errors import ModelError
 
 Float32s = npt.NDArray[np.float32]
@@ -20,7 +21,6 @@ MIN_DISTANCE = 1e-6
 MOVE_TERMS = (1, 3, 6, 10, 15)  # terms of a polynomial in two coordinates, of degree 0 to 4
 ROW_GAINS = 1
 HUGE = float(np.float32(1e30))  # as the C core compares
-NEGATIVE = 1e-5  # a negative eigenvalue up to this part of the greatest counts as rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,8 +167,7 @@ def decode_model_errors(
         )
     error, drift = (_whole(lower, rank) for lower in packed)
     for matrix in (error, drift):
-        eigenvalues = np.linalg.eigvalsh(matrix.astype(np.float64))
-        if eigenvalues[0] < -NEGATIVE * max(eigenvalues[-1], 0.0):
+        if not is_covariance(matrix):
             raise ModelError(
                 f"{where}: holds a matrix in section 'UNCE' that is not a covariance; build the"
                 " model again"
@@ -237,6 +236,23 @@ def _other_size(where: str, name: str) -> str:
     return (
         f"{where}: holds section {name!r} of a size that does not fit its rows; build the model"
         " again"
+    )
+
+
+def is_covariance(matrix: Float32s) -> bool:
+    """Whether ``matrix`` (r, r) is positive semidefinite to rounding, in units in which each
+    diagonal element is 1, as the core decides."""
+    a = matrix.astype(np.float64)
+    own = np.diag(a)
+    used = own > 0
+    if (own < 0).any() or a[~used].any():
+        return False
+    scale = np.sqrt(own[used])
+    if not len(scale):
+        return True
+    return bool(
+        np.linalg.eigvalsh(a[np.ix_(used, used)] / np.outer(scale, scale))[0]
+        >= -SECOND_MOMENT_ROUNDING
     )
 
 

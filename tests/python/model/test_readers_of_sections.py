@@ -69,8 +69,7 @@ def test_numbers_at_the_ends_of_their_ranges(name):
 
 
 def test_numbers_of_uncertainty_at_the_ends_of_their_ranges():
-    """The rms values, and numbers of the matrices that are beyond the range in any case. Whether a
-    matrix within the range is a covariance is checked by Python alone."""
+    """The rms values, and numbers of the matrices that are beyond the range in any case."""
     place = sections_of(whole())["UNCE"]
     for word in (1, 2, 3):
         for value in ENDS:
@@ -82,3 +81,18 @@ def test_numbers_of_uncertainty_at_the_ends_of_their_ranges():
             blob = bytearray(whole())
             struct.pack_into("<f", blob, place.offset + 4 * word, value)
             assert not agreed(sealed(blob), (word, value))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_matrix_that_is_no_covariance_is_refused_by_both(seed):
+    """One number of a matrix is scaled, or has another sign."""
+    place, rng = sections_of(whole())["UNCE"], np.random.default_rng(seed)
+    answers = []
+    for factor in (-1.0, 0.0, 0.5, 3.0, 30.0, 1e6):
+        for word in rng.integers(4, place.size // 4, 6):
+            blob = bytearray(whole())
+            at = place.offset + 4 * int(word)
+            (value,) = struct.unpack_from("<f", blob, at)
+            struct.pack_into("<f", blob, at, factor * value)
+            answers.append(agreed(sealed(blob), (int(word), factor)))
+    assert set(answers) == {True, False}
