@@ -59,8 +59,10 @@ extern "C" {
 #define EITS_JOINT_TRIANGLE (EITS_JOINT_PARAMETERS * (EITS_JOINT_PARAMETERS + 1u) / 2u)
 
 /* Complex numbers of one touch in the multipole model: EITS_POLE_TERMS of each electrode's field,
- * and EITS_POLE_SENT that it sends to others (csrc/src/multipole/multipole.h). */
+ * and EITS_POLE_SENT that it sends to others (csrc/src/multipole/multipole.h). The polynomial of a
+ * place inside the skin is fitted to EITS_POLE_POINTS pixels. */
 #define EITS_POLE_TERMS                6u
+#define EITS_POLE_POINTS               21u
 #define EITS_POLE_SENT                 3u
 #define EITS_POLE_FIELD(n_electrodes)  (2u * EITS_POLE_TERMS * (size_t)(n_electrodes))
 #define EITS_POLE_SOURCE(n_electrodes) (2u * EITS_POLE_SENT * (size_t)(n_electrodes))
@@ -136,9 +138,10 @@ extern "C" {
     ARRAY(evidence.gain_drift, eits_real, EITS_STRIDE(rank))                                       \
     /* the multipole model: polynomials of the fields, and what touches send to each other */      \
     ARRAY(multipole.home, eits_real, EITS_MAX_TOUCHES * EITS_POLE_FIELD(n_electrodes))             \
+    ARRAY(multipole.own, eits_real, EITS_MAX_TOUCHES * EITS_POLE_FIELD(n_electrodes))              \
     ARRAY(multipole.induced, eits_real, EITS_MAX_TOUCHES * EITS_POLE_FIELD(n_electrodes))          \
     ARRAY(multipole.sent, eits_real, EITS_MAX_TOUCHES * EITS_POLE_SOURCE(n_electrodes))            \
-    ARRAY(multipole.work, eits_real, 6u * EITS_POLE_FIELD(n_electrodes))                           \
+    ARRAY(multipole.work, eits_real, 2u * EITS_POLE_FIELD(n_electrodes))                           \
     /* the joint fit: a metric, columns of one block of folds, and the normal equations */         \
     ARRAY(joint.weight, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                           \
     ARRAY(joint.drift, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                            \
@@ -147,6 +150,7 @@ extern "C" {
     ARRAY(joint.nuisance, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_NUISANCES * (EITS_JOINT_NUISANCES + 1u) / 2u)) \
     ARRAY(joint.normal, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_TRIANGLE))               \
     ARRAY(joint.factor, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_TRIANGLE))               \
+    ARRAY(joint.kept, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_TRIANGLE))                 \
     /* columns of S as floats, and which they are */                                               \
     ARRAY(columns.data, float, EITS_CACHED(n_pixels) * EITS_STRIDE(rank))                          \
     ARRAY(columns.slot, uint16_t, n_pixels)                                                        \
@@ -182,9 +186,11 @@ extern "C" {
 #define EITS_CONTEXT_NUMBERS \
     ((23u + 2u * EITS_MAX_MOVE_TERMS) * sizeof(eits_real) + (35u + 13u) * sizeof(uint32_t))
 
-/* The multipole model keeps a pixel and a mirror per touch, the joint fit its gradient. */
+/* The multipole model keeps a pixel and a mirror per touch and the weights of the pixels around one
+ * inside the skin, the joint fit its gradient. */
 #define EITS_JOINT_NUMBERS                                            \
     (EITS_MAX_TOUCHES * (4u * sizeof(eits_real) + sizeof(uint32_t)) + \
+     2u * EITS_POLE_TERMS * EITS_POLE_POINTS * sizeof(eits_real) +    \
      (EITS_JOINT_PARAMETERS + 1u) * sizeof(eits_real) + sizeof(uint32_t))
 
 /* Bytes of the context, at the workspace's start. csrc/src/api/setup.c asserts that it fits, and

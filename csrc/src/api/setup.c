@@ -110,7 +110,7 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
     lend(made);
     map_cells(model, made->cell);
     eits_clear_column_cache(&made->columns);
-    eits_pole_forget(made);
+    eits_pole_init(made);
     /* 1 and not 0: a model without row gains multiplies by these numbers too, which leaves the bits
      * unchanged */
     for (uint32_t i = 0; i < model->n_rows; ++i)

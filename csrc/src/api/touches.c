@@ -35,18 +35,41 @@ static void note_unexplained(eits_context *ctx, eits_fit *f)
     f->beyond_noise = left > f->noise ? (left - f->noise) / f->total : 0;
 }
 
-/* Fit discs, and all of them jointly; discs that this does not make clear are tested before.
+/* Touches from the image's peaks by the joint fit alone. Returns 1 if they are clear; else `f` has
+ * discs that are fitted: the joint fit's where their number is likely right, or those of the whole
+ * fit of discs. */
+static int fit(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j)
+{
+    j->count = 0;
+    if (eits_can_fit_jointly(ctx)) {
+        eits_fit_peaks(ctx, scratch, f);
+        if (eits_fit_clearly(ctx, f, j))
+            return 1;
+        const int begun = eits_joint_is_likely(ctx, j);
+        const uint64_t macs = f->macs;
+        *f = eits_fit_none(ctx, scratch);
+        f->macs = macs;
+        if (begun) {
+            eits_joint_give(ctx, j, f);
+            eits_fit_settle(ctx, scratch, f);
+            return 0;
+        }
+    }
+    eits_fit_touches(ctx, scratch, f);
+    return 0;
+}
+
+/* Fit touches; those that this does not make clear are tested, and fitted jointly once more.
  * Whether they are crowded is checked by discs, on which its odds were counted. `found` is
  * overwritten. */
 static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
                          eits_touch *found)
 {
     eits_joint j;
-    eits_fit_touches(ctx, scratch, f);
-    note_unexplained(ctx, f);
     ctx->evidence.spent = 0; /* where no test is needed */
-    const int clear = eits_fit_clearly(ctx, f, &j);
+    const int clear = fit(ctx, scratch, f, &j);
     if (!clear) {
+        note_unexplained(ctx, f);
         eits_test_touches(ctx, scratch, f);
         eits_rate_touches(ctx, f);
         eits_fit_centre(ctx, scratch, f);

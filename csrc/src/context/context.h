@@ -206,11 +206,14 @@ typedef struct eits_evidence {
  * multipole. */
 typedef struct eits_multipole {
     eits_real *home;    /* EITS_MAX_TOUCHES slots: the fields about each touch's home pixel */
+    eits_real *own;     /* EITS_MAX_TOUCHES slots: the fields' Taylor coefficients at its middle */
     eits_real *induced; /* EITS_MAX_TOUCHES slots: what comes in from other touches and the rim */
     eits_real *sent;    /* EITS_MAX_TOUCHES x EITS_POLE_SOURCE(L): what each sends out */
     eits_real *work;    /* 6 slots, in disorder after each call */
     uint32_t home_pixel[EITS_MAX_TOUCHES]; /* EITS_NO_HOME: none is kept */
     eits_real mirror[EITS_MAX_TOUCHES][4]; /* a and b of the rim's mirror there, mm */
+    /* what each pixel around a home pixel inside the skin adds to the polynomial, complex */
+    eits_real inside[2 * EITS_POLE_TERMS * EITS_POLE_POINTS];
 } eits_multipole;
 #define EITS_NO_HOME UINT32_MAX
 
@@ -223,7 +226,8 @@ typedef struct eits_joint_memory {
     eits_real *nuisance; /* their factor L, packed by rows (joint/metric.c) */
     uint32_t errors;     /* vectors of the model's errors in use */
     eits_real error_unit;
-    eits_real *normal, *factor; /* EITS_JOINT_TRIANGLE each, packed by rows */
+    eits_real energy; /* |W d|^2 less its part along the drift: what no touches leave */
+    eits_real *normal, *factor, *kept; /* EITS_JOINT_TRIANGLE each, packed by rows */
     eits_real gradient[EITS_JOINT_PARAMETERS];
 } eits_joint_memory;
 

@@ -74,28 +74,61 @@
  * costs on fingers; smaller: ellipses are tried on discs */
 #define EITS_JOINT_HOPELESS R(60.0)
 
+/* but not while the linearisation says that F falls by more [of F]. larger: discs become ellipses
+ * before they are settled; smaller: costs on fingers */
+#define EITS_JOINT_HOPEFUL R(0.8)
+
+/* ellipses are fitted where F is expected to fall by more, as linearised [of what it has to fall
+ * by]. larger: fingers remain discs; smaller: costs */
+#define EITS_JOINT_SHAPE_HOPE R(0.5)
+
+/* touches that leave less are tested as they are; where more is left the discs are fitted from the
+ * image [of the noise]. larger: missing touches stay missing; smaller: costs */
+#define EITS_JOINT_LIKELY R(2.0)
+
+/* peaks of the image that are weaker are left out at first [of the strongest]. larger: weak touches
+ * cost a fit of discs; smaller: the solver's ripple does */
+#define EITS_JOINT_WEAK R(0.1)
+
+/* near touches need no test where F rises by more without either. as JOINT_CLEAR_RISE */
+#define EITS_JOINT_TWO_RISE R(300.0)
+
+/* a disc that is nearer to a touch of the joint fit is that touch [of the sum of radii]. only where
+ * the test of touches has changed their number */
+#define EITS_JOINT_SAME R(0.5)
+
 /* where more is left the discs as they were are reported: .16 of |d| on the KIT4 development frames
  * [of the data's square]. larger: things that are no ellipses are reported as some; smaller: fewer
  * touches profit */
 #define EITS_JOINT_MAX_LEFT R(0.0256)
 
-/* what is longer is tried as two: axes of 1.5 to 1. larger: pairs count as one; smaller: costs */
+/* what is longer, axes of 1.5 to 1, is cut across its length first; on a skin that differs from the
+ * model nothing else is tried as two. larger: costs; smaller: the same */
 #define EITS_JOINT_SPLIT_ETA R(0.2)
 
-/* where the two begin, to either side of the one's middle [of the radius]. anything else needs more
- * steps */
-#define EITS_JOINT_SPLIT_AWAY R(0.75)
+/* greatest ratio of axes of the two as they begin: of fingers side by side. anything else needs
+ * more steps */
+#define EITS_JOINT_SPLIT_ASPECT R(2.2)
 
-/* radius with which they begin: half of the area [of the radius]. as JOINT_SPLIT_AWAY */
-#define EITS_JOINT_SPLIT_RADIUS R(0.7)
+/* two are fitted where F is expected to fall by more, as linearised [of what it has to fall by].
+ * larger: pairs count as one; smaller: costs */
+#define EITS_JOINT_SPLIT_HOPE R(0.7)
+
+/* most touches of a frame that are tried as two. larger: costs; smaller: pairs beside other touches
+ * count as one */
+#define EITS_JOINT_SPLIT_TRIES 2
 
 /* nothing is tried as two where the misfit exceeds its expectation by less. larger: pairs count as
  * one; smaller: costs */
-#define EITS_JOINT_SPLIT_MISFIT R(6.0)
+#define EITS_JOINT_SPLIT_MISFIT R(8.0)
 
 /* by how much F falls at least where one becomes two. larger: pairs count as one; smaller: long
  * fingers become two */
-#define EITS_JOINT_SPLIT_FALL R(20.0)
+#define EITS_JOINT_SPLIT_FALL R(25.0)
+
+/* factor of that on a skin that differs from the model, whose errors look like a second touch. as
+ * JOINT_SPLIT_FALL */
+#define EITS_JOINT_SPLIT_FAR R(5.0)
 
 /* a light touch that is larger by more is tried as two strong ones though the data fit [log of the
  * expected radius]. larger: pairs count as one light touch; smaller: costs */
@@ -104,11 +137,12 @@
 /* by how much F falls at least where such a touch becomes two. as JOINT_SPLIT_FALL */
 #define EITS_JOINT_SPLIT_LARGE R(8.0)
 
-/* least distance of the two [of the sum of radii]. as JOINT_SPLIT_FALL */
+/* least distance of the two, half widths along the line of their middles [of the sum of half
+ * widths]. as JOINT_SPLIT_FALL */
 #define EITS_JOINT_SPLIT_APART R(0.9)
 
 /* least strength of the weaker [of the stronger]. as JOINT_SPLIT_FALL */
-#define EITS_JOINT_SPLIT_WEAKER R(0.4)
+#define EITS_JOINT_SPLIT_WEAKER R(0.25)
 
 /* the data fit where the misfit is below [of the noise]. larger: a sheet that has drifted is taken
  * for touches; smaller: long fingers are not refined */
@@ -149,11 +183,19 @@
 
 /* most Gauss-Newton steps of one descent. larger: costs in hard frames; smaller: fingers are not
  * settled */
-#define EITS_JOINT_STEPS 5
+#define EITS_JOINT_STEPS 9
 
-/* the joint fit of a frame stops before it would take more [multiply-accumulates]. larger: slow
- * frames with many touches; smaller: many touches are not settled */
-#define EITS_JOINT_WORK 2200000
+/* nothing is fitted from shapes that leave more [of what no touches leave]. larger: costs on false
+ * peaks; smaller: strong touches are given up */
+#define EITS_JOINT_WORSE R(4.0)
+
+/* a joint fit begins no step after it has taken so many [multiply-accumulates]. larger: slow frames
+ * with many touches; smaller: many touches are not settled */
+#define EITS_JOINT_WORK 800000
+
+/* trying one as two begins no step after it has taken so many [multiply-accumulates]. as
+ * JOINT_WORK */
+#define EITS_JOINT_SPLIT_WORK 500000
 
 /* damping of the first step, relative to the diagonal. larger: slower; smaller: wild first steps */
 #define EITS_JOINT_DAMPING R(0.001)

@@ -40,10 +40,14 @@ static eits_real prior_of(const eits_context *ctx, const eits_joint *j)
 
 /* ---- F and its normal equations ---- */
 
+/* Discs need fewer orders; where a single shape is none, all have those of ellipses. */
 static const eits_poles *poles_of(const eits_joint *j)
 {
     static const eits_poles discs = {.orders = 3, .sent = 2}, ellipses = {.orders = 5, .sent = 3};
-    return j->parameters == EITS_JOINT_DISC ? &discs : &ellipses;
+    int round = j->parameters == EITS_JOINT_DISC;
+    for (uint32_t k = 0; k < j->count; ++k)
+        round &= j->shape[k].e1 == 0 && j->shape[k].e2 == 0;
+    return round ? &discs : &ellipses;
 }
 
 /* Sums over blocks of folds. */
@@ -83,8 +87,8 @@ static void add_columns(eits_context *ctx, uint32_t n, uint32_t first, uint32_t 
 }
 
 /* What the shapes leave of one block, weighed, and their columns into the normal equations. */
-static uint64_t add_block(eits_context *ctx, const eits_joint *j, uint32_t first, uint32_t count,
-                          sums *s)
+static uint64_t add_block(eits_context *ctx, const eits_joint *j, int slopes, uint32_t first,
+                          uint32_t count, sums *s)
 {
     eits_joint_memory *m = &ctx->joint;
     eits_real value[BLOCK], left[BLOCK];
@@ -92,7 +96,7 @@ static uint64_t add_block(eits_context *ctx, const eits_joint *j, uint32_t first
     eits_copy(left, ctx->frame.d + first, count);
     for (uint32_t k = 0, free = 0; k < j->count; ++k) {
         eits_pole_out out = {.value = value};
-        const int varies = free < j->free_count && j->free[free] == k;
+        const int varies = slopes && free < j->free_count && j->free[free] == k;
         for (uint32_t p = 0; varies && p < j->parameters; ++p)
             out.slope[p] = m->column + (size_t)BLOCK * (free * j->parameters + p);
         free += (uint32_t)varies;
@@ -106,7 +110,7 @@ static uint64_t add_block(eits_context *ctx, const eits_joint *j, uint32_t first
         left[i] *= m->weight[first + i];
     s->square += eits_dot(ctx->kernels, left, left, count);
     eits_joint_add_along(ctx, left, first, count, s->along);
-    const uint32_t n = j->free_count * j->parameters;
+    const uint32_t n = slopes ? j->free_count * j->parameters : 0;
     add_columns(ctx, n, first, count, left);
     return macs + (uint64_t)n * (n + 7u + 2u * m->errors) / 2u * count;
 }
@@ -130,28 +134,38 @@ static void finish_normal(eits_context *ctx, const eits_joint *j, const sums *s)
     }
 }
 
-uint64_t eits_joint_evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds)
+/* F, and with `slopes` its normal equations. */
+static uint64_t evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds, int slopes)
 {
     eits_joint_memory *m = &ctx->joint;
-    const uint32_t folds = ctx->model->n_folded;
-    sums s = {.square = 0};
+    const uint32_t folds = ctx->model->n_folded, n = slopes ? j->free_count * j->parameters : 0;
+    sums s;
+    s.square = 0;
+    eits_zero(s.along, 1u + m->errors);
     uint64_t macs = 0;
-    for (uint32_t k = 0; k < j->count; ++k)
+    for (uint32_t k = 0; k < j->count && rounds > 0; ++k)
         macs += eits_pole_home(ctx, k, &j->shape[k]);
     macs += eits_pole_induced(ctx, j->shape, j->count, poles_of(j), rounds);
-    eits_zero(m->normal, EITS_LOWER_SIZE(MAX_PARAMETERS));
-    eits_zero(m->gradient, MAX_PARAMETERS);
-    eits_zero(m->along, (size_t)EITS_JOINT_NUISANCES * MAX_PARAMETERS);
+    eits_zero(m->normal, EITS_LOWER_SIZE(n));
+    eits_zero(m->gradient, n);
+    for (uint32_t a = 0; a < n; ++a)
+        eits_zero(along_of(ctx, a), 1u + m->errors);
     for (uint32_t first = 0; first < folds; first += BLOCK) {
         const uint32_t count = folds - first < BLOCK ? folds - first : BLOCK;
-        macs += add_block(ctx, j, first, count, &s);
+        macs += add_block(ctx, j, slopes, first, count, &s);
     }
     j->left = eits_fma(-s.along[0], s.along[0], s.square);
     eits_joint_finish_along(ctx, s.along);
     j->misfit = s.square - product(s.along, s.along, 1u + m->errors);
     j->cost = j->misfit + prior_of(ctx, j);
-    finish_normal(ctx, j, &s);
+    if (slopes)
+        finish_normal(ctx, j, &s);
     return macs;
+}
+
+uint64_t eits_joint_evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds)
+{
+    return evaluate(ctx, j, rounds, 1);
 }
 
 /* ---- steps ---- */
@@ -214,14 +228,39 @@ static eits_joint moved(const eits_context *ctx, const eits_joint *from, const e
     return to;
 }
 
+eits_real eits_joint_expect(eits_context *ctx, eits_joint *j, uint64_t *macs)
+{
+    const uint32_t n = j->free_count * j->parameters;
+    eits_real d[MAX_PARAMETERS];
+    eits_pole_clear(ctx, j->count);
+    *macs += eits_joint_evaluate(ctx, j, 2) + (uint64_t)n * n * (n + 6u) / 6u;
+    factor(ctx, n, EITS_JOINT_DAMPING);
+    eits_copy(d, ctx->joint.gradient, n);
+    solve(ctx, n, d);
+    return j->cost - eits_dot(ctx->kernels, ctx->joint.gradient, d, n);
+}
+
+void eits_joint_keep(eits_context *ctx, const eits_joint *j)
+{
+    eits_copy(ctx->joint.kept, ctx->joint.normal, EITS_LOWER_SIZE(j->count * j->parameters));
+}
+
+void eits_joint_back(eits_context *ctx, const eits_joint *j)
+{
+    eits_copy(ctx->joint.normal, ctx->joint.kept, EITS_LOWER_SIZE(j->count * j->parameters));
+}
+
 void eits_joint_descend(eits_context *ctx, eits_joint *j, uint32_t rounds, eits_real hopeless,
                         uint64_t *macs)
 {
-    const uint32_t n = j->free_count * j->parameters;
-    const uint64_t begin = *macs;
-    eits_real damping = EITS_JOINT_DAMPING;
     *macs += eits_joint_evaluate(ctx, j, rounds);
-    const uint64_t each = *macs - begin + (uint64_t)n * n * (n + 6u) / 6u;
+    eits_joint_continue(ctx, j, hopeless, macs);
+}
+
+void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, uint64_t *macs)
+{
+    const uint32_t n = j->free_count * j->parameters;
+    eits_real damping = EITS_JOINT_DAMPING;
     for (uint32_t step = 0; step < EITS_JOINT_STEPS; ++step) {
         eits_real d[MAX_PARAMETERS];
         factor(ctx, n, damping);
@@ -229,21 +268,21 @@ void eits_joint_descend(eits_context *ctx, eits_joint *j, uint32_t rounds, eits_
         solve(ctx, n, d);
         const eits_real predicted = eits_dot(ctx->kernels, ctx->joint.gradient, d, n);
         if (!(predicted > EITS_JOINT_SETTLED) ||
-            ((step > 0 || j->parameters == EITS_JOINT_DISC) && j->cost - predicted > hopeless) ||
-            *macs + 2u * each > EITS_JOINT_WORK) /* a step, and the way back from it */
+            !(j->misfit < EITS_JOINT_WORSE * ctx->joint.energy) ||
+            (predicted < EITS_JOINT_HOPEFUL * j->cost && j->cost - predicted > hopeless) ||
+            *macs > j->most)
             return;
         eits_joint trial = moved(ctx, j, d);
-        *macs += eits_joint_evaluate(ctx, &trial, 1) + (uint64_t)n * n * (n + 6u) / 6u;
+        *macs += evaluate(ctx, &trial, 1, 0) + (uint64_t)n * n * (n + 6u) / 6u;
         const eits_real fallen = j->cost - trial.cost;
         if (fallen > 0) {
             *j = trial;
             damping *= EITS_JOINT_DAMP_LESS;
             if (eits_fabs(predicted - fallen) < EITS_JOINT_AS_PREDICTED * eits_joint_excess(ctx, j))
                 return;
-        } else { /* back, to a shorter step */
-            *macs += eits_joint_evaluate(ctx, j, 1);
+            *macs += evaluate(ctx, j, 0, 1);
+        } else /* again, a shorter step */
             damping = eits_larger(EITS_JOINT_DAMP_MORE * damping, EITS_JOINT_DAMPED);
-        }
     }
 }
 

@@ -22,7 +22,7 @@ typedef struct eits_joint {
     eits_shape shape[EITS_MAX_TOUCHES];
     uint32_t from[EITS_MAX_TOUCHES]; /* which of the fit's discs it was or was part of */
     uint32_t free[EITS_MAX_TOUCHES]; /* those that are varied, by ascending number */
-    uint64_t spent;                  /* multiply-accumulates of settling in this frame */
+    uint64_t most; /* multiply-accumulates of settling after which no step is begun */
     uint32_t count, free_count;
     uint32_t parameters; /* of each: EITS_JOINT_DISC or EITS_JOINT_ELLIPSE */
     eits_real cost;      /* F */
@@ -61,6 +61,16 @@ uint64_t eits_joint_evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds);
  * Adds to `macs`. The normal equations are those about *j then. */
 void eits_joint_descend(eits_context *ctx, eits_joint *j, uint32_t rounds, eits_real hopeless,
                         uint64_t *macs);
+
+/* What F would fall to by the linearisation about *j, from nothing induced. Adds to `macs`. */
+eits_real eits_joint_expect(eits_context *ctx, eits_joint *j, uint64_t *macs);
+
+/* The same from an evaluation about *j, which is the last that was made. */
+void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, uint64_t *macs);
+
+/* Keep the normal equations about *j, and take them back, where something else was tried. */
+void eits_joint_keep(eits_context *ctx, const eits_joint *j);
+void eits_joint_back(eits_context *ctx, const eits_joint *j);
 
 /* All shapes are varied. */
 void eits_joint_free_all(eits_joint *j);
@@ -143,6 +153,12 @@ int eits_can_fit_jointly(const eits_context *ctx);
  * returned. Else *f stays as it is. Does nothing where the model has no fields, where the option is
  * off, and on an instrument that is far from the model; j->count is 0 then. */
 int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j);
+
+/* Whether the shapes leave so little that their number is likely right. */
+int eits_joint_is_likely(const eits_context *ctx, const eits_joint *j);
+
+/* The shapes as the discs of `f`. */
+void eits_joint_give(const eits_context *ctx, const eits_joint *j, eits_fit *f);
 
 /* After the test: the same for the touches that it left; *j is from eits_fit_clearly. Touches stay
  * as they are where the joint fit leaves too much of the data, and on a sheet that has drifted, of

@@ -33,7 +33,7 @@ void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled,
     *macs += eits_joint_places(ctx, j, known);
     const eits_real most = EITS_JOINT_OTHER_RISE * eits_joint_excess(ctx, j);
     for (uint32_t k = 0; k < j->count; ++k) {
-        if (!(known[k].other_rise < most) || *macs + 2u * settled > EITS_JOINT_WORK)
+        if (!(known[k].other_rise < most) || *macs + settled / 2u > j->most)
             continue;
         ++tried;
         turned += (uint32_t)turn(ctx, j, k, macs);

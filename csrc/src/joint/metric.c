@@ -141,6 +141,7 @@ uint64_t eits_joint_metric(eits_context *ctx)
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k)
         m->weight[k] *= unit;
     m->errors = errors_above_noise(ctx, errors, variance);
+    m->energy = unit * unit * energy;
     m->error_unit = unit * eits_sqrt(errors);
     return factor_nuisances(ctx);
 }

@@ -19,14 +19,44 @@ static eits_shape shape_of(const eits_context *ctx, const eits_disc *d)
 }
 
 /* The fit's discs as shapes, each of the strength that was found. */
-static eits_joint begin(const eits_context *ctx, const eits_fit *f, uint64_t spent)
+static eits_joint begin(const eits_context *ctx, const eits_fit *f)
 {
-    eits_joint j = {.spent = spent, .count = f->count, .parameters = EITS_JOINT_DISC};
+    eits_joint j = {.count = f->count, .parameters = EITS_JOINT_DISC};
     for (uint32_t k = 0; k < f->count; ++k) {
         j.from[k] = k;
         j.shape[k] = shape_of(ctx, &f->disc[k]);
     }
     return j;
+}
+
+/* Whether a disc lies on the skin as a whole: multipoles about a middle that is nearer to the rim
+ * than its edge do not converge. */
+static int is_inside(const eits_context *ctx, const eits_shape *s)
+{
+    const eits_real r = s->radius;
+    return eits_pole_on_skin(ctx, s->x - r, s->y) && eits_pole_on_skin(ctx, s->x + r, s->y) &&
+           eits_pole_on_skin(ctx, s->x, s->y - r) && eits_pole_on_skin(ctx, s->x, s->y + r);
+}
+
+/* Leave out what the image often shows beside touches: peaks at the rim, and weak ones. If the
+ * others explain the frame, these were none. */
+static void leave_out_weak(const eits_context *ctx, eits_joint *j)
+{
+    eits_real greatest = 0;
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < j->count; ++k) {
+        const eits_shape *s = &j->shape[k];
+        greatest = eits_larger(greatest, eits_fabs(s->amplitude) * s->radius * s->radius);
+    }
+    for (uint32_t k = 0; k < j->count; ++k) {
+        const eits_shape *s = &j->shape[k];
+        if (!is_inside(ctx, s) ||
+            eits_fabs(s->amplitude) * s->radius * s->radius < EITS_JOINT_WEAK * greatest)
+            continue;
+        j->from[count] = j->from[k];
+        j->shape[count++] = *s;
+    }
+    j->count = count;
 }
 
 static int all_finite(const eits_joint *j)
@@ -148,12 +178,17 @@ static int explains(const eits_context *ctx, const eits_joint *j)
     return all_finite(j) && left_beyond_noise(ctx, j) < EITS_JOINT_MAX_LEFT * eits_joint_data(ctx);
 }
 
-/* Whether any two shapes are so near that they may be one. */
-static int any_near(const eits_joint *j)
+/* Whether any two shapes may be one: they are near, were not found better than one (split.c), and
+ * one of them could go without much of a rise. */
+static int any_may_be_one(const eits_context *ctx, const eits_joint *j,
+                          const eits_joint_known *known)
 {
+    const eits_real least = EITS_JOINT_TWO_RISE * eits_joint_excess(ctx, j);
     for (uint32_t k = 1; k < j->count; ++k) {
         for (uint32_t i = 0; i < k; ++i) {
-            if (eits_joint_near(&j->shape[i], &j->shape[k], EITS_JOINT_CLEAR_APART))
+            if (j->from[i] != j->from[k] &&
+                eits_joint_near(&j->shape[i], &j->shape[k], EITS_JOINT_CLEAR_APART) &&
+                !(known[i].rise > least && known[k].rise > least))
                 return 1;
         }
     }
@@ -183,29 +218,52 @@ static int is_clear(const eits_context *ctx, const eits_joint *j, const eits_joi
  * needs no test; else j->count is 0 unless *j has the discs as they are, settled. */
 static int fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j, eits_joint_known *known)
 {
-    *j = begin(ctx, f, 0);
+    *j = begin(ctx, f);
+    if (!f->settled)
+        leave_out_weak(ctx, j);
     const uint32_t fewer = eits_joint_merge(j);
     int clear = 0;
-    if (!any_near(j) && j->count * j->parameters <= EITS_JOINT_PARAMETERS) {
+    if (j->count > 0 && j->count * j->parameters <= EITS_JOINT_PARAMETERS) {
         if (fewer == 0)
             eits_joint_guess_kinds(ctx, j);
         f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, j);
         if (explains(ctx, j)) {
             f->macs += eits_joint_places(ctx, j, known);
-            clear = is_clear(ctx, j, known, fewer) && !any_near(j);
+            clear = is_clear(ctx, j, known, fewer) && !any_may_be_one(ctx, j, known);
         }
-        if (clear || fewer == 0)
-            return clear;
+        return clear;
     }
     j->count = 0;
     return 0;
+}
+
+int eits_joint_is_likely(const eits_context *ctx, const eits_joint *j)
+{
+    return j->count > 0 && explains(ctx, j) && eits_joint_excess(ctx, j) < EITS_JOINT_LIKELY;
+}
+
+void eits_joint_give(const eits_context *ctx, const eits_joint *j, eits_fit *f)
+{
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm, sheet = eits_pole_sheet(model);
+    f->count = j->count;
+    for (uint32_t k = 0; k < j->count; ++k) {
+        const eits_shape *s = &j->shape[k];
+        f->disc[k] = (eits_disc){
+            .x_mm = eits_fma(s->x, pixel, (eits_real)model->origin_x_mm),
+            .y_mm = eits_fma(s->y, pixel, (eits_real)model->origin_y_mm),
+            .radius_mm = eits_clamp(s->radius * pixel, ctx->options.touch_min_radius_mm,
+                                    ctx->options.touch_max_radius_mm),
+            .change = sheet * s->amplitude,
+            .polarity = s->amplitude < 0 ? R(-1) : R(1),
+        };
+    }
 }
 
 int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j)
 {
     eits_joint_known known[EITS_MAX_TOUCHES];
     j->count = 0;
-    j->spent = 0;
     eits_pole_forget(ctx);
     if (!may_fit(ctx, f) || !fit_clearly(ctx, f, j, known))
         return 0;
@@ -220,13 +278,27 @@ int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j)
     return 1;
 }
 
+/* Whether *j has a shape at each of the fit's discs. */
+static int same_touches(const eits_context *ctx, const eits_fit *f, const eits_joint *j)
+{
+    int same = f->count == j->count;
+    for (uint32_t k = 0; k < f->count && same; ++k) {
+        const eits_shape s = shape_of(ctx, &f->disc[k]);
+        uint32_t near = 0;
+        for (uint32_t i = 0; i < j->count; ++i)
+            near += (uint32_t)eits_joint_near(&s, &j->shape[i], EITS_JOINT_SAME);
+        same = near == 1;
+    }
+    return same;
+}
+
 void eits_fit_jointly(eits_context *ctx, eits_fit *f, eits_joint *j)
 {
     eits_joint_known known[EITS_MAX_TOUCHES];
     if (!f->tested || !may_fit(ctx, f))
         return;
-    if (f->changed || j->count == 0) {
-        *j = begin(ctx, f, j->spent);
+    if (!same_touches(ctx, f, j)) {
+        *j = begin(ctx, f);
         eits_joint_guess_kinds(ctx, j);
         f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, j);
     }

@@ -1,55 +1,103 @@
-/* One touch or two: what a single ellipse explains is tried as two touches on its long axis.
+/* One touch or two: what an ellipse does not explain is tried as two touches in its place.
  *
- * Only what is clearly long is tried, the longest first. The two begin as discs that reach as far
- * as the ellipse, and become ellipses as all others are. They stand if the data then fit, if F
- * falls by enough, if their edges are about apart, and if the weaker is no shred of the other: a
- * finger that presses unevenly is one. */
+ * Two fingers side by side are as round as one, so four directions are looked at; the one that the
+ * linearisation finds best is fitted. The two stand if the data then fit, if F falls by enough, if
+ * their edges are about apart, and if the weaker is no shred of the other: a finger that presses
+ * unevenly is one. */
 #include "joint/joint.h"
 
 #include "base/vec.h"
+#include "context/places.h"
 #include "joint/constants.h"
 
-/* The longest touch that is long enough; j->count where there is none. */
+enum { DIRECTIONS = 4 };
+
+/* The longest touch that was not tried; j->count where there is none. */
 static uint32_t longest(const eits_joint *j, const uint8_t *tried)
 {
     uint32_t best = j->count;
-    eits_real eta = EITS_JOINT_SPLIT_ETA;
+    eits_real most = 0;
     for (uint32_t k = 0; k < j->count; ++k) {
-        if (!tried[k] && eits_pole_eta(&j->shape[k]) > eta) {
+        const eits_real eta = eits_pole_eta(&j->shape[k]),
+                        size = j->shape[k].radius * eits_sqrt((1 + eta) / (1 - eta));
+        if (!tried[k] && size > most) {
             best = k;
-            eta = eits_pole_eta(&j->shape[k]);
+            most = size;
         }
     }
     return best;
 }
 
-/* Two discs in the place of shape k, the second one last. */
-static eits_joint as_two(const eits_joint *one, uint32_t k)
+/* Across the long axis, between, and along it. */
+static void direction(const eits_shape *s, int d, eits_real axis[2])
+{
+    const eits_real eta = eits_pole_eta(s), half = R(0.70710678118654752440);
+    eits_real along[2] = {1, 0};
+    if (eta > R(1e-6))
+        eits_half_angle(s->e1, s->e2, eta, along);
+    const eits_real cosine[DIRECTIONS] = {0, half, half, 1}, sine[DIRECTIONS] = {1, half, -half, 0};
+    axis[0] = eits_fma(cosine[d], along[0], -(sine[d] * along[1]));
+    axis[1] = eits_fma(sine[d], along[0], cosine[d] * along[1]);
+}
+
+/* How far a shape reaches along the unit vector: the ellipse's half width there. */
+static eits_real reach(const eits_shape *s, eits_real x, eits_real y)
+{
+    const eits_real eta = eits_pole_eta(s), r2 = s->radius * s->radius;
+    /* cos and sin of twice the vector's angle, times eta: e . (cos, sin) is eta cos 2 psi */
+    const eits_real twice = eits_fma(s->e1, eits_fma(x, x, -(y * y)), s->e2 * 2 * x * y);
+    /* a^2 b^2 / (b^2 cos^2 + a^2 sin^2) with a^2 + b^2 and a^2 - b^2 by eta */
+    const eits_real sum = 1 + eta * eta, difference = 2 * twice;
+    return eits_sqrt(r2 * (1 - eta * eta) / (sum - difference));
+}
+
+/* Two strong touches in the place of shape k, the second one last: they have its strength, its
+ * extent across the line of their middles, and its second moment along it. With half axes w along
+ * that line and middles h to either side of the one's, two have h^2 + w^2 / 4 there; the one, which
+ * reaches L, has L^2 / 4. */
+static eits_joint as_two(const eits_joint *one, uint32_t k, int d)
 {
     eits_joint two = *one;
-    two.shape[k] = eits_joint_as_strong(&one->shape[k]);
     eits_shape *a = &two.shape[k], *b = &two.shape[two.count++];
-    const eits_real away = EITS_JOINT_SPLIT_AWAY * a->radius;
     eits_real axis[2];
-    eits_half_angle(a->e1, a->e2, eits_pole_eta(a), axis);
-    a->radius *= EITS_JOINT_SPLIT_RADIUS;
-    a->e1 = a->e2 = 0;
+    direction(a, d, axis);
+    const eits_real length = reach(a, axis[0], axis[1]), area = a->radius * a->radius;
+    a->radius *= R(0.70710678118654752440);
+    *a = eits_joint_as_strong(a);
+    const eits_real r2 = a->radius * a->radius, narrow = eits_sqrt(r2 / EITS_JOINT_SPLIT_ASPECT),
+                    wide = eits_larger(r2 * length / area, narrow), across = r2 / wide,
+                    eta = (across - wide) / (across + wide),
+                    away = eits_sqrt(eits_larger(eits_fma(length, length, -(wide * wide)),
+                                                 length * length / 2)) /
+                           2;
+    a->e1 = eits_clamp(-eta * eits_fma(axis[0], axis[0], -(axis[1] * axis[1])), -EITS_JOINT_MAX_ETA,
+                       EITS_JOINT_MAX_ETA);
+    a->e2 = eits_clamp(-eta * 2 * axis[0] * axis[1], -EITS_JOINT_MAX_ETA, EITS_JOINT_MAX_ETA);
     *b = *a;
     a->x = eits_fma(away, axis[0], a->x);
     a->y = eits_fma(away, axis[1], a->y);
     b->x = eits_fma(-away, axis[0], b->x);
     b->y = eits_fma(-away, axis[1], b->y);
+    two.from[one->count] = one->from[k];
+    two.parameters = EITS_JOINT_ELLIPSE;
+    two.free_count = 2;
+    two.free[0] = k;
+    two.free[1] = one->count;
     return two;
 }
 
 static int are_two(const eits_shape *a, const eits_shape *b)
 {
     const eits_real dx = a->x - b->x, dy = a->y - b->y,
-                    touching = EITS_JOINT_SPLIT_APART * (a->radius + b->radius),
+                    apart = eits_sqrt(eits_fma(dx, dx, dy * dy)),
                     p = a->amplitude * a->radius * a->radius,
                     q = b->amplitude * b->radius * b->radius;
-    return eits_fma(dx, dx, dy * dy) > touching * touching && p * q > 0 &&
-           p / q > EITS_JOINT_SPLIT_WEAKER && q / p > EITS_JOINT_SPLIT_WEAKER;
+    if (!(apart > 0))
+        return 0;
+    const eits_real touching = EITS_JOINT_SPLIT_APART * (reach(a, dx / apart, dy / apart) +
+                                                         reach(b, dx / apart, dy / apart));
+    return apart > touching && p * q > 0 && p / q > EITS_JOINT_SPLIT_WEAKER &&
+           q / p > EITS_JOINT_SPLIT_WEAKER;
 }
 
 /* A light touch that is as large as two strong ones: the data hardly tell it from these, so they
@@ -59,52 +107,103 @@ static int is_large(const eits_context *ctx, const eits_shape *s)
     return eits_joint_is_light(s) && eits_joint_offset(ctx, s, 2) > EITS_JOINT_LIGHT_LARGE;
 }
 
+/* By how much F has to fall where a shape becomes two. */
+static eits_real needed_fall(const eits_context *ctx, const eits_shape *one)
+{
+    const eits_real fall = is_large(ctx, one) ? EITS_JOINT_SPLIT_LARGE : EITS_JOINT_SPLIT_FALL;
+    return eits_weighs_errors(ctx) ? EITS_JOINT_SPLIT_FAR * fall : fall;
+}
+
 /* Whether the two that shape k became stand, beside `one`. */
 static int stand(const eits_context *ctx, const eits_joint *one, const eits_joint *two, uint32_t k)
 {
-    const eits_real excess = eits_joint_excess(ctx, two), fall = is_large(ctx, &one->shape[k])
-                                                                     ? EITS_JOINT_SPLIT_LARGE
-                                                                     : EITS_JOINT_SPLIT_FALL;
-    return excess < EITS_JOINT_FITTED && one->cost - two->cost > fall * excess &&
+    const eits_real excess = eits_joint_excess(ctx, two);
+    return excess < EITS_JOINT_FITTED &&
+           one->cost - two->cost > needed_fall(ctx, &one->shape[k]) * excess &&
            are_two(&two->shape[k], &two->shape[one->count]);
+}
+
+/* Shape k as two along the direction that the linearisation finds best, or along one by which the
+ * data would fit; 0 where none promises enough. */
+static int best_two(eits_context *ctx, const eits_joint *one, uint32_t k, eits_joint *best,
+                    uint64_t *spent)
+{
+    const eits_real fits = eits_joint_freedom(ctx, one);
+    eits_real least = one->cost - EITS_JOINT_SPLIT_HOPE * needed_fall(ctx, &one->shape[k]);
+    const int is_long = eits_pole_eta(&one->shape[k]) > EITS_JOINT_SPLIT_ETA,
+              far = eits_weighs_errors(ctx) != 0;
+    int found = 0;
+    if (far && !is_long) /* the model's errors look like two fingers side by side, too */
+        return 0;
+    for (int d = 0; d < (far ? 1 : DIRECTIONS) && !(found && least < fits); ++d) {
+        /* what is clearly long is cut across first */
+        eits_joint two = as_two(one, k, is_long ? DIRECTIONS - 1 - d : d);
+        if (!eits_pole_on_skin(ctx, two.shape[k].x, two.shape[k].y) ||
+            !eits_pole_on_skin(ctx, two.shape[one->count].x, two.shape[one->count].y))
+            continue;
+        const eits_real expected = eits_joint_expect(ctx, &two, spent);
+        if (expected < least) {
+            *best = two;
+            least = expected;
+            found = 1;
+        }
+    }
+    return found;
+}
+
+/* Shape k as the other kind, light or strong, where that fits better; *j becomes that. */
+static int try_other_kind(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *spent)
+{
+    eits_joint other = *j;
+    other.shape[k] = eits_joint_as_other(&j->shape[k]);
+    other.free_count = 1;
+    other.free[0] = k;
+    if (!(eits_joint_expect(ctx, &other, spent) < j->cost - EITS_JOINT_SHAPE_FALL))
+        return 0;
+    eits_joint_free_all(&other);
+    eits_joint_descend(ctx, &other, 1, R(INFINITY), spent);
+    if (!(other.cost < j->cost - EITS_JOINT_SHAPE_FALL))
+        return 0;
+    *j = other;
+    return 1;
+}
+
+/* Shape k as two, where they stand; *j becomes that. */
+static int try_two(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *spent)
+{
+    eits_joint two;
+    if (!best_two(ctx, j, k, &two, spent))
+        return 0;
+    (void)eits_joint_expect(ctx, &two, spent);
+    eits_joint_continue(ctx, &two, R(INFINITY), spent);
+    if (!stand(ctx, j, &two, k))
+        return 0;
+    eits_joint_free_all(&two);
+    eits_joint_descend(ctx, &two, 1, R(INFINITY), spent);
+    *j = two;
+    return 1;
 }
 
 uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent)
 {
     const uint64_t begin = spent;
     uint8_t tried[EITS_MAX_TOUCHES] = {0};
-    int stale = 0;
-    /* where one is wrong the data fit worse than noise does */
-    const int fits = !(j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT);
-    while (j->parameters == EITS_JOINT_ELLIPSE && j->count < ctx->options.max_touches &&
-           (j->count + 1u) * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS) {
+    uint32_t tries = 0;
+    j->most = spent + EITS_JOINT_SPLIT_WORK;
+    while (j->count < ctx->options.max_touches && tries < EITS_JOINT_SPLIT_TRIES &&
+           spent < j->most && (j->count + 1u) * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS) {
         const uint32_t k = longest(j, tried);
         if (k == j->count)
             break;
         tried[k] = 1;
-        if (fits && !is_large(ctx, &j->shape[k]))
+        /* where one is wrong the data fit worse than noise does */
+        if (!(j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT) &&
+            !is_large(ctx, &j->shape[k]))
             continue;
-        eits_joint two = as_two(j, k);
-        if (!eits_pole_on_skin(ctx, two.shape[k].x, two.shape[k].y) ||
-            !eits_pole_on_skin(ctx, two.shape[j->count].x, two.shape[j->count].y))
-            continue;
-        two.free_count = 2;
-        two.free[0] = k;
-        two.free[1] = j->count;
-        stale = 1;
-        eits_pole_clear(ctx, two.count);
-        eits_joint_descend(ctx, &two, 2, j->cost - EITS_JOINT_SPLIT_LARGE, &spent);
-        if (!stand(ctx, j, &two, k))
-            continue;
-        two.from[j->count] = j->from[k];
-        eits_joint_free_all(&two);
-        eits_joint_descend(ctx, &two, 1, R(INFINITY), &spent);
-        *j = two;
-        stale = 0;
-    }
-    if (stale) {
-        eits_pole_clear(ctx, j->count);
-        spent += eits_joint_evaluate(ctx, j, 2);
+        ++tries;
+        eits_joint_keep(ctx, j);
+        if (!try_other_kind(ctx, j, k, &spent) && !try_two(ctx, j, k, &spent))
+            eits_joint_back(ctx, j);
     }
     return spent - begin;
 }

@@ -13,6 +13,13 @@ static inline eits_complex eits_times(eits_complex a, eits_complex b)
     return (eits_complex){eits_fma(a.re, b.re, -(a.im * b.im)), eits_fma(a.re, b.im, a.im * b.re)};
 }
 
+/* sum + a b */
+static inline eits_complex eits_plus_times(eits_complex sum, eits_complex a, eits_complex b)
+{
+    return (eits_complex){eits_fma(a.re, b.re, eits_fma(-a.im, b.im, sum.re)),
+                          eits_fma(a.re, b.im, eits_fma(a.im, b.re, sum.im))};
+}
+
 static inline eits_complex eits_scaled(eits_real s, eits_complex a)
 {
     return (eits_complex){s * a.re, s * a.im};

@@ -15,6 +15,10 @@
  * wanted than there are; smaller: noise of the stored fields */
 #define EITS_POLE_REACH R(2.6)
 
+/* the polynomial is kept while the middle is nearer to the home pixel's along either axis [pixels].
+ * larger: answers err; smaller: costs */
+#define EITS_POLE_STAYS R(1.0)
+
 /* monomials are of z over this, so that none is far greater than 1 [pixels]. anything else loses
  * digits in float32 */
 #define EITS_POLE_UNIT R(2.0)

@@ -39,14 +39,29 @@ static eits_real long_axis(const eits_shape *s, eits_complex *axis)
     return eta < EITS_POLE_MAX_ETA ? eta : EITS_POLE_MAX_ETA;
 }
 
+/* T_nk = f^(k-n) 2^(1-k) binomial(k, (k-n)/2) e^(i k phi) */
+static void set_modes(eits_form *f)
+{
+    for (uint32_t n = 1; n <= f->orders; ++n) {
+        eits_real power = 1;
+        for (uint32_t k = n; k <= f->orders; k += 2u) {
+            const eits_real factor =
+                power * eits_pole_halves[k] * eits_pole_binomial[k][(k - n) / 2u];
+            f->to_mode[n - 1u][k - 1u] = eits_scaled(factor, f->turn[k - 1u]);
+            power *= f->f2;
+        }
+    }
+}
+
 eits_form eits_form_of(const eits_shape *s, uint32_t orders)
 {
-    eits_form f = {.orders = orders};
+    eits_form f;
     eits_complex axis;
     const eits_real eta = long_axis(s, &axis), r2 = s->radius * s->radius;
     const eits_real contrast = (2 + s->amplitude) / (2 - s->amplitude);
     /* a + b and a - b squared: with a b = r^2, (a + b)^2 = 4 r^2 / (1 - eta^2) */
     const eits_real wide = 4 * r2 / (1 - eta * eta), narrow = eta * eta * wide;
+    f.orders = orders;
     f.f2 = eta * wide;
     f.excess = contrast - 1;
     eits_complex turn = {1, 0};
@@ -61,23 +76,18 @@ eits_form eits_form_of(const eits_shape *s, uint32_t orders)
         f.ts[n] = 2 / (eits_fma(contrast, 1 + en, 1 - en));
         f.gap[n] = wn - nn;
     }
+    set_modes(&f);
     return f;
 }
 
-void eits_modes(const eits_form *f, const eits_real *a, uint32_t shift, uint32_t electrodes,
-                eits_real *out)
+void eits_modes(const eits_form *f, const eits_real *a, uint32_t electrodes, eits_real *out)
 {
     const size_t width = 2u * (size_t)electrodes;
-    for (uint32_t n = 1; n <= f->orders; ++n) {
-        eits_real *to = out + width * (n - 1u), power = 1;
+    for (uint32_t n = 0; n < f->orders; ++n) {
+        eits_real *to = out + width * n;
         eits_zero(to, width);
-        for (uint32_t k = n; k <= f->orders; k += 2u) {
-            const eits_real steps = shift == 0 ? 1 : (eits_real)(k + 1u);
-            const eits_real factor =
-                steps * power * eits_pole_halves[k] * eits_pole_binomial[k][(k - n) / 2u];
-            eits_add_times(to, eits_scaled(factor, f->turn[k - 1u]), a + width * (k - 1u + shift),
-                           electrodes);
-            power *= f->f2;
+        for (uint32_t k = n; k < f->orders; k += 2u) {
+            eits_add_times(to, f->to_mode[n][k], a + width * k, electrodes);
             if (f->f2 == 0)
                 break;
         }

@@ -16,16 +16,16 @@ typedef struct eits_form {
     eits_real excess;                   /* contrast - 1 */
     eits_real tc[EITS_POLE_ORDERS], ts[EITS_POLE_ORDERS];
     eits_real gap[EITS_POLE_ORDERS]; /* (a+b)^(2n) - (a-b)^(2n) */
+    /* beta_n+1 = sum over k = n, n + 2, ... of to_mode[n][k] a_k+1; the others are not set */
+    eits_complex to_mode[EITS_POLE_ORDERS][EITS_POLE_ORDERS];
 } eits_form;
 
 eits_form eits_form_of(const eits_shape *s, uint32_t orders);
 
+/* beta_n of each electrode from the Taylor coefficients `a`. */
+void eits_modes(const eits_form *f, const eits_real *a, uint32_t electrodes, eits_real *out);
+
 /* out += s a, for complex arrays of `electrodes` numbers (real parts, then imaginary parts). */
 void eits_add_times(eits_real *out, eits_complex s, const eits_real *a, uint32_t electrodes);
-
-/* beta_n of each electrode from the Taylor coefficients `a`, whose n-th term is multiplied by
- * step(n) and taken from `shift` terms further on (0: the field, 1: its slope by x). */
-void eits_modes(const eits_form *f, const eits_real *a, uint32_t shift, uint32_t electrodes,
-                eits_real *out);
 
 #endif

@@ -159,17 +159,18 @@ static uint64_t receive(const eits_context *ctx, const eits_shape *shape, uint32
             eits_real *re = to + width * (q - 1u), *im = re + electrodes;
             term =
                 eits_scaled(-((eits_real)(k + q - 1u) / (eits_real)q), eits_times(term, nearness));
-            if (i != j)
-                eits_add_times(re, term, sent, electrodes);
+            /* term B + image conj(B), where term is that of another shape */
+            const eits_complex own = i == j ? (eits_complex){0, 0} : term;
+            const eits_real by_re = own.re + image[q].re, by_im = image[q].im - own.im,
+                            im_by_re = own.im + image[q].im, im_by_im = own.re - image[q].re;
             for (uint32_t e = 0; e < electrodes; ++e) {
-                const eits_complex part =
-                    eits_times(image[q], (eits_complex){sent[e], -sent[electrodes + e]});
-                re[e] += part.re;
-                im[e] += part.im;
+                const eits_real b = sent[e], b_im = sent[electrodes + e];
+                re[e] = eits_fma(by_re, b, eits_fma(by_im, b_im, re[e]));
+                im[e] = eits_fma(im_by_re, b, eits_fma(im_by_im, b_im, im[e]));
             }
         }
     }
-    return (uint64_t)sent_orders * terms * electrodes * (i == j ? 4u : 8u);
+    return (uint64_t)sent_orders * terms * electrodes * 4u;
 }
 
 void eits_pole_clear(eits_context *ctx, uint32_t count)
@@ -189,10 +190,10 @@ uint64_t eits_pole_induced(eits_context *ctx, const eits_shape *shape, uint32_t 
         for (uint32_t i = 0; i < count; ++i) {
             const eits_form f = eits_form_of(&shape[i], poles->orders);
             const eits_real *induced = ctx->multipole.induced + slot * i;
-            eits_pole_field(ctx, i, &shape[i], field);
+            const eits_real *own = ctx->multipole.own + slot * i;
             for (size_t e = 0; e < width * poles->orders; ++e)
-                field[e] += induced[e];
-            eits_modes(&f, field, 0, electrodes, mode);
+                field[e] = own[e] + induced[e];
+            eits_modes(&f, field, electrodes, mode);
             send(&f, mode, poles->sent, electrodes,
                  ctx->multipole.sent + width * EITS_POLE_SENT * i);
         }
@@ -202,5 +203,5 @@ uint64_t eits_pole_induced(eits_context *ctx, const eits_shape *shape, uint32_t 
                 macs += receive(ctx, shape, i, j, poles);
         }
     }
-    return macs + (uint64_t)rounds * electrodes * count * (84u + 12u * poles->orders);
+    return macs + (uint64_t)rounds * electrodes * count * 12u * poles->orders;
 }

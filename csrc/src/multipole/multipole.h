@@ -59,12 +59,16 @@ static inline eits_real eits_pole_sheet(const eits_model *model)
     return 1 / (R(6.28318530717958647693) * (eits_real)model->fields.per_sheet);
 }
 
+/* taylor.c: once for a context, before any other function. */
+void eits_pole_init(eits_context *ctx);
+
 /* taylor.c: whether a place lies on a kept pixel. */
 int eits_pole_on_skin(const eits_context *ctx, eits_real x, eits_real y);
 
 /* taylor.c: the polynomial of each electrode's field about the pixel nearest to the shape's middle,
  * by least squares over the pixels around it. It is kept in slot k while the middle stays in that
- * pixel. Returns the multiply-accumulates, 0 where the kept one serves. */
+ * pixel. The shape's own field (eits_pole_field) is put into ctx->multipole.own. Returns the
+ * multiply-accumulates of the polynomial, 0 where the kept one serves. */
 uint64_t eits_pole_home(eits_context *ctx, uint32_t k, const eits_shape *shape);
 
 /* a_1 ... a_TERMS at the middle: TERMS x 2 L numbers, the real parts of a term before its imaginary

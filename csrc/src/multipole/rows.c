@@ -1,23 +1,22 @@
 /* Compute what shapes answer on the folded rows.
  *
  * A row's answer is the drive's field with what is induced, times the measuring pair's without it.
- * By reciprocity the reverse is the same once the rounds have converged. */
+ * By reciprocity the reverse is the same once the rounds have converged.
+ *
+ * The answer is bilinear in both sides' Taylor coefficients. For each drive the coefficients by
+ * which it and its slopes multiply those of a measuring pair are made once; a row then takes one
+ * sum of products for the answer and for each slope. */
 #include "base/vec.h"
 #include "multipole/constants.h"
 #include "multipole/form.h"
 
 static const eits_real PI = R(3.14159265358979323846);
 
-/* One side of a row: by order, the difference of two electrodes' modes, real part and imaginary
- * part. The drive's lies in the whole field, times the order's weights, and is made once for all
- * rows of a drive; the measuring pair's lies in its own. */
-typedef struct side {
-    eits_real re[EITS_POLE_ORDERS], im[EITS_POLE_ORDERS];
-} side;
+enum { ORDERS = EITS_POLE_ORDERS, TERMS = EITS_POLE_TERMS, SLOPES = 6 };
 
 /* What orders weigh in a row's voltage: c for products of real parts, s of imaginary ones. */
 typedef struct order_weights {
-    eits_real c[EITS_POLE_ORDERS], s[EITS_POLE_ORDERS];
+    eits_real c[ORDERS], s[ORDERS];
 } order_weights;
 
 static order_weights weights_of(const eits_context *ctx, const eits_form *f)
@@ -25,7 +24,7 @@ static order_weights weights_of(const eits_context *ctx, const eits_form *f)
     const eits_fields *at = &ctx->model->fields;
     const eits_real pixel = (eits_real)ctx->model->pixel_mm;
     const eits_real volts = (eits_real)at->volts * eits_pole_sheet(ctx->model) * pixel * pixel;
-    order_weights w = {{0}, {0}};
+    order_weights w;
     for (uint32_t n = 0; n < f->orders; ++n) {
         const eits_real whole = -(volts * f->excess * (eits_real)(n + 1u) * (PI / 4) * f->gap[n]);
         w.c[n] = whole * f->tc[n];
@@ -34,52 +33,207 @@ static order_weights weights_of(const eits_context *ctx, const eits_form *f)
     return w;
 }
 
-static side difference(const eits_real *mode, uint32_t plus, uint32_t minus, uint32_t orders,
-                       uint32_t electrodes)
-{
-    side out = {{0}, {0}};
-    for (uint32_t n = 0; n < orders; ++n) {
-        const eits_real *re = mode + 2u * (size_t)electrodes * n, *im = re + electrodes;
-        out.re[n] = re[plus] - re[minus];
-        out.im[n] = im[plus] - im[minus];
-    }
-    return out;
-}
-
-/* The drive's side, and its slopes by x and y: along y, a slope is i times that along x. */
-typedef struct drive_side {
-    side whole, by_x, by_y;
-} drive_side;
-
-static drive_side drive_of(const eits_real *whole, const eits_real *by, const order_weights *w,
-                           const uint8_t *row, uint32_t orders, uint32_t electrodes)
-{
-    drive_side d = {.whole = difference(whole, row[0], row[1], orders, electrodes),
-                    .by_x = difference(by, row[0], row[1], orders, electrodes)};
-    for (uint32_t n = 0; n < orders; ++n) {
-        d.by_y.re[n] = -(w->c[n] * d.by_x.im[n]);
-        d.by_y.im[n] = w->s[n] * d.by_x.re[n];
-        d.by_x.re[n] *= w->c[n];
-        d.by_x.im[n] *= w->s[n];
-        d.whole.re[n] *= w->c[n];
-        d.whole.im[n] *= w->s[n];
-    }
-    return d;
-}
-
-/* The relative change of each order's weight with the amplitude. */
-static order_weights per_amplitude(const eits_form *f, eits_real amplitude)
+/* The same, times the relative change of each order's weight with the amplitude. */
+static order_weights by_amplitude(const order_weights *w, const eits_form *f, eits_real amplitude)
 {
     const eits_real of_contrast = 4 / ((2 - amplitude) * (2 - amplitude)),
                     part = eits_fabs(f->excess) > R(1e-6) ? of_contrast / f->excess : 0;
-    order_weights w = {{0}, {0}};
+    order_weights by;
     for (uint32_t n = 0; n < f->orders; ++n) {
         /* of (k - 1) t with t = 2 / (u + k w) and u + w = 2, the logarithm's slope by k is
          * t / (k - 1) */
-        w.c[n] = part * f->tc[n];
-        w.s[n] = part * f->ts[n];
+        by.c[n] = w->c[n] * part * f->tc[n];
+        by.s[n] = w->s[n] * part * f->ts[n];
     }
-    return w;
+    return by;
+}
+
+/* The shape with e1 (part 0) or e2 (part 1) a little larger. */
+static eits_shape varied(const eits_shape *shape, int part)
+{
+    eits_shape out = *shape;
+    if (part == 0)
+        out.e1 += EITS_POLE_STEP;
+    else
+        out.e2 += EITS_POLE_STEP;
+    return out;
+}
+
+/* A shape as the rows take it; with `more`, one whose e1 or e2 is larger. */
+typedef struct answering {
+    eits_form form;
+    order_weights weight;
+} answering;
+
+static answering answering_of(const eits_context *ctx, const eits_shape *shape, uint32_t orders)
+{
+    answering a = {.form = eits_form_of(shape, orders)};
+    a.weight = weights_of(ctx, &a.form);
+    return a;
+}
+
+/* beta_n = sum over k of T_nk a_k. Five orders, as ellipses have them, are written out: a compiler
+ * does not unroll such loops. */
+static inline void to_modes(const eits_form *f, uint32_t orders, const eits_complex *a,
+                            eits_complex *beta)
+{
+    if (orders == 5u) {
+        const eits_complex(*t)[ORDERS] = f->to_mode;
+        beta[0] = eits_plus_times(eits_plus_times(eits_times(t[0][0], a[0]), t[0][2], a[2]),
+                                  t[0][4], a[4]);
+        beta[1] = eits_plus_times(eits_times(t[1][1], a[1]), t[1][3], a[3]);
+        beta[2] = eits_plus_times(eits_times(t[2][2], a[2]), t[2][4], a[4]);
+        beta[3] = eits_times(t[3][3], a[3]);
+        beta[4] = eits_times(t[4][4], a[4]);
+        return;
+    }
+    for (uint32_t n = 0; n < orders; ++n) {
+        eits_complex sum = eits_times(f->to_mode[n][n], a[n]);
+        for (uint32_t k = n + 2u; k < orders; k += 2u)
+            sum = eits_plus_times(sum, f->to_mode[n][k], a[k]);
+        beta[n] = sum;
+    }
+}
+
+/* c_k = sum over n of T_nk g_n with g = w_c Re beta - i w_s Im beta: then the real part of
+ * sum c_k m_k is the answer to a measuring pair's m_k. */
+static inline void answer_of(const eits_form *f, uint32_t orders, const order_weights *w,
+                             const eits_complex *beta, eits_complex *c)
+{
+    eits_complex g[ORDERS];
+    for (uint32_t n = 0; n < orders; ++n)
+        g[n] = (eits_complex){w->c[n] * beta[n].re, -(w->s[n] * beta[n].im)};
+    if (orders == 5u) {
+        const eits_complex(*t)[ORDERS] = f->to_mode;
+        c[0] = eits_times(t[0][0], g[0]);
+        c[1] = eits_times(t[1][1], g[1]);
+        c[2] = eits_plus_times(eits_times(t[2][2], g[2]), t[0][2], g[0]);
+        c[3] = eits_plus_times(eits_times(t[3][3], g[3]), t[1][3], g[1]);
+        c[4] = eits_plus_times(eits_plus_times(eits_times(t[4][4], g[4]), t[0][4], g[0]), t[2][4],
+                               g[2]);
+        return;
+    }
+    for (uint32_t k = 0; k < orders; ++k) {
+        eits_complex sum = eits_times(f->to_mode[k][k], g[k]);
+        for (uint32_t n = k % 2u; n < k; n += 2u)
+            sum = eits_plus_times(sum, f->to_mode[n][k], g[n]);
+        c[k] = sum;
+    }
+}
+
+/* By what a drive multiplies a measuring pair's numbers (real part and imaginary part of each
+ * term): for the answer, then for the slopes in the order of eits_pole_out. */
+typedef struct drive {
+    eits_real by[1 + SLOPES][2 * TERMS];
+} drive;
+
+static inline void put(eits_real *by, const eits_complex *c, uint32_t terms)
+{
+    for (uint32_t k = 0; k < terms; ++k) {
+        by[2u * k] = c[k].re;
+        by[2u * k + 1u] = -c[k].im;
+    }
+}
+
+/* The difference of two electrodes' coefficients, with what is induced. */
+static void whole_field(const eits_real *own, const eits_real *induced, uint32_t electrodes,
+                        const uint8_t *row, eits_complex *a)
+{
+    const uint32_t plus = row[0], minus = row[1];
+    for (uint32_t k = 0; k < TERMS; ++k) {
+        const eits_real *re = own + 2u * (size_t)electrodes * k, *im = re + electrodes,
+                        *more = induced + 2u * (size_t)electrodes * k, *more_im = more + electrodes;
+        a[k].re = (re[plus] + more[plus]) - (re[minus] + more[minus]);
+        a[k].im = (im[plus] + more_im[plus]) - (im[minus] + more_im[minus]);
+    }
+}
+
+/* Of answers c and x to the fields a_k and (k + 1) a_k+1, the slopes by place: a shift of the
+ * middle by dx changes a_k by (k + 1) a_k+1 dx on both sides, one by dy by i times that. */
+static inline void put_moves(drive *d, uint32_t orders, const eits_complex *c, eits_complex *x,
+                             eits_complex *y)
+{
+    x[orders] = y[orders] = (eits_complex){0, 0};
+    for (uint32_t k = 1; k <= orders; ++k) {
+        const eits_complex more = eits_scaled((eits_real)(k + 1u), c[k - 1u]);
+        x[k].re += more.re;
+        x[k].im += more.im;
+        y[k].re -= more.im;
+        y[k].im += more.re;
+    }
+    put(d->by[1], x, orders + 1u);
+    put(d->by[2], y, orders + 1u);
+}
+
+/* A disc's orders do not couple, and its amplitude scales all of them alike. */
+static inline void disc_drive(const answering *s, uint32_t orders, eits_real by_amplitude_share,
+                              int slopes, const eits_complex *a, drive *d)
+{
+    eits_complex c[ORDERS], x[TERMS], y[TERMS], other[ORDERS];
+    for (uint32_t k = 0; k < orders; ++k) {
+        const eits_real w = s->weight.c[k] * (s->form.to_mode[k][k].re * s->form.to_mode[k][k].re);
+        c[k] = (eits_complex){w * a[k].re, -(w * a[k].im)};
+        x[k] = (eits_complex){(eits_real)(k + 2u) * w * a[k + 1u].re,
+                              -((eits_real)(k + 2u) * w * a[k + 1u].im)};
+        y[k] = (eits_complex){x[k].im, -x[k].re}; /* of i times that field */
+    }
+    put(d->by[0], c, orders);
+    if (!slopes)
+        return;
+    put_moves(d, orders, c, x, y);
+    for (uint32_t k = 0; k < orders; ++k)
+        other[k] = eits_scaled((eits_real)(2u * (k + 1u)), c[k]);
+    put(d->by[3], other, orders);
+    for (uint32_t k = 0; k < orders; ++k)
+        other[k] = eits_scaled(by_amplitude_share, c[k]);
+    put(d->by[4], other, orders);
+}
+
+/* The answer, and slopes by place, log radius and amplitude; a_k r^k is what a larger radius
+ * scales.
+ */
+static inline void ellipse_drive(const answering *s, uint32_t orders, const order_weights *by_q,
+                                 int slopes, const eits_complex *a, eits_complex *c, drive *d)
+{
+    eits_complex field[ORDERS], beta[ORDERS], mode[ORDERS], x[TERMS], y[TERMS];
+    to_modes(&s->form, orders, a, beta);
+    answer_of(&s->form, orders, &s->weight, beta, c);
+    put(d->by[0], c, orders);
+    if (!slopes)
+        return;
+    for (uint32_t k = 0; k < orders; ++k)
+        field[k] = eits_scaled((eits_real)(k + 2u), a[k + 1u]);
+    to_modes(&s->form, orders, field, mode);
+    answer_of(&s->form, orders, &s->weight, mode, x);
+    for (uint32_t k = 0; k < orders; ++k)
+        mode[k] = (eits_complex){-mode[k].im, mode[k].re};
+    answer_of(&s->form, orders, &s->weight, mode, y);
+    put_moves(d, orders, c, x, y);
+    for (uint32_t k = 0; k < orders; ++k)
+        field[k] = eits_scaled((eits_real)(k + 1u), a[k]);
+    to_modes(&s->form, orders, field, mode);
+    answer_of(&s->form, orders, &s->weight, mode, x);
+    for (uint32_t k = 0; k < orders; ++k) {
+        x[k].re = eits_fma((eits_real)(k + 1u), c[k].re, x[k].re);
+        x[k].im = eits_fma((eits_real)(k + 1u), c[k].im, x[k].im);
+    }
+    put(d->by[3], x, orders);
+    answer_of(&s->form, orders, by_q, beta, x);
+    put(d->by[4], x, orders);
+}
+
+/* Slope by e1 or e2, as a difference. */
+static inline void slope_by_shape(const answering *more, uint32_t orders, const eits_complex *a,
+                                  const eits_complex *c, eits_real *by)
+{
+    const eits_real per = 1 / EITS_POLE_STEP;
+    eits_complex beta[ORDERS], varied_c[ORDERS];
+    to_modes(&more->form, orders, a, beta);
+    answer_of(&more->form, orders, &more->weight, beta, varied_c);
+    for (uint32_t k = 0; k < orders; ++k) {
+        by[2u * k] = (varied_c[k].re - c[k].re) * per;
+        by[2u * k + 1u] = (c[k].im - varied_c[k].im) * per;
+    }
 }
 
 static const uint8_t *fold_row(const eits_context *ctx, uint32_t fold)
@@ -93,136 +247,146 @@ static int new_drive(const uint8_t *row, const uint8_t *before)
     return before == NULL || row[0] != before[0] || row[1] != before[1];
 }
 
-/* The shape's answer on the folds. */
-static void fill_values(const eits_context *ctx, const eits_shape *shape, const eits_poles *poles,
-                        uint32_t first, uint32_t count, eits_real *out)
+/* The next number of a measuring pair, into the answer and the slopes. */
+#define NEXT_NUMBER(J)                                        \
+    do {                                                      \
+        const eits_real number = *plus - *minus;              \
+        plus += electrodes;                                   \
+        minus += electrodes;                                  \
+        value = eits_fma(d->by[0][J], number, value);         \
+        x = eits_fma(d->by[1][J], number, x);                 \
+        y = eits_fma(d->by[2][J], number, y);                 \
+        radius = eits_fma(d->by[3][J], number, radius);       \
+        amplitude = eits_fma(d->by[4][J], number, amplitude); \
+        if (shaped) {                                         \
+            e1 = eits_fma(d->by[5][J], number, e1);           \
+            e2 = eits_fma(d->by[6][J], number, e2);           \
+        }                                                     \
+    } while (0)
+
+/* The last order, which slopes by place alone have. */
+#define LAST_NUMBER(J)                           \
+    do {                                         \
+        const eits_real number = *plus - *minus; \
+        plus += electrodes;                      \
+        minus += electrodes;                     \
+        x = eits_fma(d->by[1][J], number, x);    \
+        y = eits_fma(d->by[2][J], number, y);    \
+    } while (0)
+
+/* The answer to a measuring pair, and its slopes: of discs (three orders) or ellipses (five).
+ * Written out, so that the sums stay in registers. */
+static inline void fill_row(const drive *d, const eits_real *own, uint32_t electrodes,
+                            const uint8_t *row, int shaped, uint32_t i, const eits_pole_out *out)
 {
-    const uint32_t electrodes = ctx->model->n_electrodes;
-    const size_t width = 2u * (size_t)electrodes, slot = width * EITS_POLE_TERMS;
-    eits_real *field = ctx->multipole.work, *own = field + 2u * slot, *whole = own + slot;
-    const eits_form f = eits_form_of(shape, poles->orders);
-    const order_weights w = weights_of(ctx, &f);
-    eits_modes(&f, field, 0, electrodes, own);
-    eits_modes(&f, field + slot, 0, electrodes, whole);
-    const uint8_t *before = NULL;
-    side drive = {{0}, {0}};
-    for (uint32_t i = 0; i < count; ++i) {
-        const uint8_t *row = fold_row(ctx, first + i);
-        if (new_drive(row, before)) {
-            drive = difference(whole, row[0], row[1], f.orders, electrodes);
-            for (uint32_t n = 0; n < f.orders; ++n) {
-                drive.re[n] *= w.c[n];
-                drive.im[n] *= w.s[n];
-            }
-        }
-        before = row;
-        const uint32_t plus = row[2], minus = row[3];
-        const eits_real *re = own, *im = own + electrodes;
+    const eits_real *plus = own + row[2], *minus = own + row[3];
+    eits_real value = 0, x = 0, y = 0, radius = 0, amplitude = 0, e1 = 0, e2 = 0;
+    NEXT_NUMBER(0);
+    NEXT_NUMBER(1);
+    NEXT_NUMBER(2);
+    NEXT_NUMBER(3);
+    NEXT_NUMBER(4);
+    NEXT_NUMBER(5);
+    if (shaped) {
+        NEXT_NUMBER(6);
+        NEXT_NUMBER(7);
+        NEXT_NUMBER(8);
+        NEXT_NUMBER(9);
+        LAST_NUMBER(10);
+        LAST_NUMBER(11);
+        out->slope[4][i] = e1;
+        out->slope[5][i] = e2;
+    } else {
+        LAST_NUMBER(6);
+        LAST_NUMBER(7);
+    }
+    out->value[i] = value;
+    out->slope[0][i] = x;
+    out->slope[1][i] = y;
+    out->slope[2][i] = radius;
+    out->slope[3][i] = amplitude;
+}
+
+/* The same for any number of orders and slopes. */
+static void fill_any_row(const drive *d, const eits_real *own, uint32_t electrodes,
+                         const uint8_t *row, uint32_t orders, uint32_t slopes, uint32_t i,
+                         const eits_pole_out *out)
+{
+    const eits_real *plus = own + row[2], *minus = own + row[3];
+    for (uint32_t p = 0; p <= slopes; ++p) {
+        const uint32_t numbers = 2u * (p == 1u || p == 2u ? orders + 1u : orders);
         eits_real sum = 0;
-        for (uint32_t n = 0; n < f.orders; ++n, re += width, im += width)
-            sum = eits_fma(drive.re[n], re[plus] - re[minus],
-                           eits_fma(drive.im[n], im[plus] - im[minus], sum));
-        out[i] = sum;
+        for (uint32_t j = 0; j < numbers; ++j)
+            sum = eits_fma(d->by[p][j],
+                           plus[(size_t)electrodes * j] - minus[(size_t)electrodes * j], sum);
+        if (p == 0)
+            out->value[i] = sum;
+        else
+            out->slope[p - 1u][i] = sum;
     }
 }
 
-/* Answer and slopes by place, log radius and amplitude of a disc or, but for the radius, of an
- * ellipse. Slopes by place come from the Taylor series of the same fields, one term on: the drive's
- * slope times the measuring pair's modes and the reverse. Order n goes with r^(2n) for a disc. */
-static void fill_slopes(const eits_context *ctx, const eits_shape *shape, const eits_poles *poles,
-                        uint32_t first, uint32_t count, const eits_pole_out *out)
+/* What a drive's rows take. */
+static void make_drive(const eits_shape *shape, const answering s[3], const order_weights *by_q,
+                       uint32_t slopes, const eits_complex *a, drive *d)
 {
-    const uint32_t electrodes = ctx->model->n_electrodes;
-    const size_t width = 2u * (size_t)electrodes, slot = width * EITS_POLE_TERMS;
-    eits_real *field = ctx->multipole.work, *own = field + 2u * slot, *whole = own + slot,
-              *own_by = whole + slot, *whole_by = own_by + slot;
-    const eits_form f = eits_form_of(shape, poles->orders);
-    const order_weights w = weights_of(ctx, &f), per = per_amplitude(&f, shape->amplitude);
-    eits_modes(&f, field, 0, electrodes, own);
-    eits_modes(&f, field + slot, 0, electrodes, whole);
-    eits_modes(&f, field, 1, electrodes, own_by);
-    eits_modes(&f, field + slot, 1, electrodes, whole_by);
-    const uint8_t *before = NULL;
-    drive_side d = {.whole = {{0}, {0}}};
-    for (uint32_t i = 0; i < count; ++i) {
-        const uint8_t *row = fold_row(ctx, first + i);
-        if (new_drive(row, before))
-            d = drive_of(whole, whole_by, &w, row, f.orders, electrodes);
-        before = row;
-        const uint32_t plus = row[2], minus = row[3];
-        const eits_real *re = own, *by = own_by;
-        eits_real value = 0, x = 0, y = 0, radius = 0, amplitude = 0, twice = 2;
-        for (uint32_t n = 0; n < f.orders; ++n, re += width, by += width, twice += 2) {
-            const eits_real *im = re + electrodes, *by_im = by + electrodes;
-            const eits_real mr = re[plus] - re[minus], mi = im[plus] - im[minus],
-                            br = by[plus] - by[minus], bi = by_im[plus] - by_im[minus],
-                            dr = d.whole.re[n], di = d.whole.im[n], real = dr * mr,
-                            imaginary = di * mi, part = real + imaginary;
-            value += part;
-            radius = eits_fma(twice, part, radius);
-            amplitude = eits_fma(per.c[n], real, eits_fma(per.s[n], imaginary, amplitude));
-            x = eits_fma(dr, br, eits_fma(di, bi, x));
-            x = eits_fma(d.by_x.re[n], mr, eits_fma(d.by_x.im[n], mi, x));
-            y = eits_fma(di, br, eits_fma(-dr, bi, y));
-            y = eits_fma(d.by_y.re[n], mr, eits_fma(d.by_y.im[n], mi, y));
-        }
-        out->value[i] = value;
-        out->slope[0][i] = x;
-        out->slope[1][i] = y;
-        out->slope[2][i] = radius;
-        out->slope[3][i] = amplitude;
+    const uint32_t orders = s[0].form.orders;
+    const int round = shape->e1 == 0 && shape->e2 == 0;
+    eits_complex c[ORDERS];
+    if (round && slopes <= 4u) {
+        const eits_real share = s[0].weight.c[0] != 0 ? by_q->c[0] / s[0].weight.c[0] : 0;
+        if (orders == 3u)
+            disc_drive(&s[0], 3, share, slopes > 0, a, d);
+        else
+            disc_drive(&s[0], orders, share, slopes > 0, a, d);
+        return;
     }
-}
-
-/* The shape with parameter p (2: log radius ... 5: e2) a little larger. */
-static eits_shape varied(const eits_shape *shape, uint32_t p, eits_real step)
-{
-    eits_shape out = *shape;
-    switch (p) {
-    case 2:
-        out.radius *= 1 + step;
-        break;
-    case 3:
-        out.amplitude += step;
-        break;
-    case 4:
-        out.e1 += step;
-        break;
-    default:
-        out.e2 += step;
-        break;
+    if (orders == 5u) {
+        ellipse_drive(&s[0], 5, by_q, slopes > 0, a, c, d);
+        for (uint32_t part = 0; part + 4u < slopes; ++part)
+            slope_by_shape(&s[1u + part], 5, a, c, d->by[5u + part]);
+    } else {
+        ellipse_drive(&s[0], orders, by_q, slopes > 0, a, c, d);
+        for (uint32_t part = 0; part + 4u < slopes; ++part)
+            slope_by_shape(&s[1u + part], orders, a, c, d->by[5u + part]);
     }
-    return out;
 }
 
 uint64_t eits_pole_rows(eits_context *ctx, uint32_t k, const eits_shape *shape,
                         const eits_poles *poles, uint32_t first, uint32_t count,
                         const eits_pole_out *out)
 {
-    const uint32_t electrodes = ctx->model->n_electrodes;
-    const size_t slot = 2u * (size_t)electrodes * EITS_POLE_TERMS;
-    eits_real *own = ctx->multipole.work, *whole = own + slot;
-    const eits_real *induced = ctx->multipole.induced + slot * k;
-    const uint64_t field = 84u * electrodes, mode = 4u * poles->orders * electrodes,
-                   row = (uint64_t)count * poles->orders;
-    eits_pole_field(ctx, k, shape, own);
-    for (size_t e = 0; e < slot; ++e)
-        whole[e] = own[e] + induced[e];
-    if (out->slope[0] == NULL) {
-        fill_values(ctx, shape, poles, first, count, out->value);
-        return field + mode + 2u * row;
+    const uint32_t electrodes = ctx->model->n_electrodes, orders = poles->orders,
+                   slopes = out->slope[0] == NULL ? 0u : (out->slope[4] == NULL ? 4u : 6u);
+    const eits_real *own = ctx->multipole.own + EITS_POLE_FIELD(electrodes) * k,
+                    *induced = ctx->multipole.induced + EITS_POLE_FIELD(electrodes) * k;
+    answering s[3]; /* the shape, and those with a larger e1 and e2 */
+    s[0] = answering_of(ctx, shape, orders);
+    const order_weights by_q = by_amplitude(&s[0].weight, &s[0].form, shape->amplitude);
+    for (int part = 0; part < 2 && slopes == 6u; ++part) {
+        const eits_shape larger = varied(shape, part);
+        s[1 + part] = answering_of(ctx, &larger, orders);
     }
-    fill_slopes(ctx, shape, poles, first, count, out);
-    if (out->slope[4] == NULL)
-        return field + 2u * mode + 14u * row;
-    for (uint32_t p = 2; p < 6u; ++p) {
-        if (p == 3u)
-            continue;
-        const eits_shape more = varied(shape, p, EITS_POLE_STEP);
-        eits_real *slope = out->slope[p];
-        fill_values(ctx, &more, poles, first, count, slope);
-        for (uint32_t i = 0; i < count; ++i)
-            slope[i] = (slope[i] - out->value[i]) / EITS_POLE_STEP;
+    const uint8_t *before = NULL;
+    uint32_t drives = 0;
+    drive d;
+    for (uint32_t i = 0; i < count; ++i) {
+        const uint8_t *row = fold_row(ctx, first + i);
+        if (new_drive(row, before)) {
+            eits_complex a[TERMS];
+            whole_field(own, induced, electrodes, row, a);
+            make_drive(shape, s, &by_q, slopes, a, &d);
+            ++drives;
+        }
+        before = row;
+        if (slopes == 6u && orders == 5u)
+            fill_row(&d, own, electrodes, row, 1, i, out);
+        else if (slopes == 4u && orders == 3u)
+            fill_row(&d, own, electrodes, row, 0, i, out);
+        else
+            fill_any_row(&d, own, electrodes, row, orders, slopes, i, out);
     }
-    return field + 5u * mode + 20u * row;
+    const uint32_t products = shape->e1 == 0 && shape->e2 == 0 ? 4u * orders : 8u * orders;
+    return (uint64_t)count * (1u + slopes) * 2u * orders +
+           (uint64_t)drives * (slopes + 1u) * products;
 }

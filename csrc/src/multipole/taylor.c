@@ -80,26 +80,53 @@ static uint32_t home_pixel(const eits_context *ctx, const eits_shape *shape)
     return best;
 }
 
+/* Whether a place of the square around the home pixel is near enough; where it is, and how far. */
+static int is_near(uint32_t place, eits_complex *z, eits_real *share)
+{
+    const uint32_t side = 2u * AROUND + 1u;
+    *z = (eits_complex){(eits_real)(place % side) - AROUND, (eits_real)(place / side) - AROUND};
+    *share = eits_fma(z->re, z->re, z->im * z->im) / (EITS_POLE_REACH * EITS_POLE_REACH);
+    return *share < 1;
+}
+
+static void add_point(points *p, uint32_t pixel, eits_complex z, eits_real share)
+{
+    p->pixel[p->count] = pixel;
+    p->weight[p->count] = 1 - share;
+    p->z[p->count] = (eits_complex){z.re / EITS_POLE_UNIT, z.im / EITS_POLE_UNIT};
+    ++p->count;
+}
+
 static points points_around(const eits_context *ctx, uint32_t home)
 {
     const eits_model *model = ctx->model;
     const eits_pixel at = model->pixel[home];
-    points p = {.count = 0};
+    points p;
+    p.count = 0;
     for (uint32_t place = 0; place < MAX_POINTS; ++place) {
         const uint32_t side = 2u * AROUND + 1u, ix = at.ix + place % side - AROUND,
                        iy = at.iy + place / side - AROUND; /* 0 - 1: none */
-        const eits_real dx = (eits_real)(place % side) - AROUND,
-                        dy = (eits_real)(place / side) - AROUND,
-                        share = eits_fma(dx, dx, dy * dy) / (EITS_POLE_REACH * EITS_POLE_REACH);
-        if (ix >= model->nx || iy >= model->ny || !(share < 1))
+        eits_complex z;
+        eits_real share;
+        if (!is_near(place, &z, &share) || ix >= model->nx || iy >= model->ny)
             continue;
         const uint32_t j = ctx->cell[(size_t)iy * model->nx + ix];
-        if (j == EITS_NO_PIXEL)
-            continue;
-        p.pixel[p.count] = j;
-        p.weight[p.count] = 1 - share;
-        p.z[p.count] = (eits_complex){dx / EITS_POLE_UNIT, dy / EITS_POLE_UNIT};
-        ++p.count;
+        if (j != EITS_NO_PIXEL)
+            add_point(&p, j, z, share);
+    }
+    return p;
+}
+
+/* The points of a home pixel with all of its neighbours, which are the same everywhere. */
+static points all_points(void)
+{
+    points p;
+    p.count = 0;
+    for (uint32_t place = 0; place < MAX_POINTS; ++place) {
+        eits_complex z;
+        eits_real share;
+        if (is_near(place, &z, &share))
+            add_point(&p, 0, z, share);
     }
     return p;
 }
@@ -145,68 +172,106 @@ static void make_basis(const points *p, basis *b)
     }
 }
 
-/* Q* W F of all electrodes into `terms`, and the mirror at the home pixel. */
-static void project_fields(eits_context *ctx, const points *p, const basis *b, uint32_t home,
-                           eits_real *terms, eits_real *mirror)
+/* What each point's F adds to each coefficient: T^-1 Q* W, then of z and not of z / EITS_POLE_UNIT.
+ * Coefficients that the points do not tell are 0. */
+static void weigh_points(const points *p, const basis *b, eits_complex *weight)
+{
+    for (uint32_t i = 0; i < p->count; ++i) {
+        eits_complex *w = weight + (size_t)EITS_POLE_TERMS * i;
+        for (uint32_t n = b->terms; n < EITS_POLE_TERMS; ++n)
+            w[n] = (eits_complex){0, 0};
+        for (uint32_t n = b->terms; n-- > 0;) {
+            eits_complex sum = eits_scaled(p->weight[i], eits_conjugate(b->q[n][i]));
+            for (uint32_t m = n + 1; m < b->terms; ++m)
+                sum = eits_plus_times(sum, eits_scaled(-1, b->t[n][m]), w[m]);
+            w[n] = (eits_complex){sum.re / b->t[n][n].re, sum.im / b->t[n][n].re};
+        }
+        eits_real unit = 1;
+        for (uint32_t n = 0; n < b->terms; ++n) {
+            w[n] = eits_scaled(unit, w[n]);
+            unit /= EITS_POLE_UNIT;
+        }
+    }
+}
+
+/* A stored column: E_x, E_y, then the mirror. */
+static void read_fields(const eits_context *ctx, uint32_t pixel, eits_real *at)
+{
+#ifndef EITS_DOUBLE
+    const eits_matrix *fields = &ctx->model->fields.at;
+    ctx->kernels->unpack(fields, (size_t)fields->stride * pixel, fields->stride, at);
+#else
+    eits_read_column(&ctx->model->fields.at, pixel, at);
+#endif
+}
+
+/* The coefficients of F = E_x - i E_y of all electrodes, and the mirror at the home pixel. */
+static void fit_fields(eits_context *ctx, const points *p, const eits_complex *weight,
+                       uint32_t home, eits_real *terms, eits_real *mirror)
 {
     const uint32_t electrodes = ctx->model->n_electrodes;
-    eits_real *at = ctx->multipole.work; /* a stored column: E_x, E_y, then the mirror */
+    const size_t width = 2u * (size_t)electrodes;
+    eits_real *at = ctx->multipole.work;
     eits_zero(terms, EITS_POLE_FIELD(electrodes));
     for (uint32_t i = 0; i < p->count; ++i) {
-        eits_read_column(&ctx->model->fields.at, p->pixel[i], at);
+        const eits_complex *w = weight + (size_t)EITS_POLE_TERMS * i;
+        read_fields(ctx, p->pixel[i], at);
         if (p->pixel[i] == home)
-            eits_copy(mirror, at + 2u * electrodes, 4);
-        for (uint32_t n = 0; n < b->terms; ++n) {
-            eits_real *re = terms + 2u * (size_t)electrodes * n, *im = re + electrodes;
-            const eits_complex s = {p->weight[i] * b->q[n][i].re, p->weight[i] * b->q[n][i].im};
-            for (uint32_t e = 0; e < electrodes; ++e) { /* conj(s) (E_x - i E_y) */
-                const eits_real x = at[e], y = at[electrodes + e];
-                re[e] = eits_fma(s.re, x, eits_fma(-s.im, y, re[e]));
-                im[e] = eits_fma(-s.re, y, eits_fma(-s.im, x, im[e]));
+            eits_copy(mirror, at + width, 4);
+        for (uint32_t e = 0; e < electrodes; ++e) {
+            const eits_real x = at[e], y = at[electrodes + e];
+            eits_real *re = terms + e, *im = re + electrodes;
+            for (uint32_t n = 0; n < EITS_POLE_TERMS; ++n) {
+                re[width * n] = eits_fma(w[n].re, x, eits_fma(w[n].im, y, re[width * n]));
+                im[width * n] = eits_fma(w[n].im, x, eits_fma(-w[n].re, y, im[width * n]));
             }
         }
     }
 }
 
-/* T^-1 of that, from the last term on; then terms are of z and not of z / EITS_POLE_UNIT. */
-static void substitute_back(const basis *b, uint32_t electrodes, eits_real *terms)
+void eits_pole_init(eits_context *ctx)
 {
-    const size_t width = 2u * (size_t)electrodes;
-    for (uint32_t n = b->terms; n-- > 0;) {
-        eits_real *re = terms + width * n, *im = re + electrodes;
-        for (uint32_t m = n + 1; m < b->terms; ++m) {
-            const eits_complex t = b->t[n][m];
-            const eits_real *from = terms + width * m, *from_im = from + electrodes;
-            for (uint32_t e = 0; e < electrodes; ++e) {
-                re[e] = eits_fma(-t.re, from[e], eits_fma(t.im, from_im[e], re[e]));
-                im[e] = eits_fma(-t.re, from_im[e], eits_fma(-t.im, from[e], im[e]));
-            }
-        }
-        for (uint32_t e = 0; e < width; ++e)
-            re[e] /= b->t[n][n].re;
-    }
-    eits_real unit = 1;
-    for (uint32_t n = 0; n < b->terms; ++n) {
-        for (uint32_t e = 0; e < width; ++e)
-            terms[width * n + e] *= unit;
-        unit /= EITS_POLE_UNIT;
-    }
+    const points all = all_points();
+    basis b;
+    make_basis(&all, &b);
+    weigh_points(&all, &b, (eits_complex *)ctx->multipole.inside);
+    eits_pole_forget(ctx);
+}
+
+/* Whether the polynomial in slot k serves a middle that has left its home pixel, but not by far. */
+static int may_stay(const eits_context *ctx, uint32_t k, const eits_shape *shape)
+{
+    if (ctx->multipole.home_pixel[k] == EITS_NO_HOME)
+        return 0;
+    const eits_pixel at = ctx->model->pixel[ctx->multipole.home_pixel[k]];
+    return eits_fabs(shape->x - (eits_real)at.ix - R(0.5)) < EITS_POLE_STAYS &&
+           eits_fabs(shape->y - (eits_real)at.iy - R(0.5)) < EITS_POLE_STAYS;
 }
 
 uint64_t eits_pole_home(eits_context *ctx, uint32_t k, const eits_shape *shape)
 {
     const uint32_t electrodes = ctx->model->n_electrodes, home = home_pixel(ctx, shape);
-    if (ctx->multipole.home_pixel[k] == home)
-        return 0;
-    const points p = points_around(ctx, home);
-    basis b;
-    make_basis(&p, &b);
-    eits_real *terms = ctx->multipole.home + EITS_POLE_FIELD(electrodes) * k;
-    project_fields(ctx, &p, &b, home, terms, ctx->multipole.mirror[k]);
-    substitute_back(&b, electrodes, terms);
-    ctx->multipole.home_pixel[k] = home;
-    return (uint64_t)electrodes * 4u * b.terms * (p.count + b.terms / 2u) +
-           (uint64_t)8u * p.count * b.terms * b.terms;
+    eits_real *terms = ctx->multipole.home + EITS_POLE_FIELD(electrodes) * k,
+              *own = ctx->multipole.own + EITS_POLE_FIELD(electrodes) * k;
+    uint64_t macs = 0;
+    if (ctx->multipole.home_pixel[k] != home && !may_stay(ctx, k, shape)) {
+        const points p = points_around(ctx, home);
+        macs = (uint64_t)electrodes * 4u * EITS_POLE_TERMS * p.count;
+        if (p.count == EITS_POLE_POINTS) {
+            fit_fields(ctx, &p, (const eits_complex *)ctx->multipole.inside, home, terms,
+                       ctx->multipole.mirror[k]);
+        } else {
+            basis b;
+            eits_complex weight[MAX_POINTS * EITS_POLE_TERMS];
+            make_basis(&p, &b);
+            weigh_points(&p, &b, weight);
+            fit_fields(ctx, &p, weight, home, terms, ctx->multipole.mirror[k]);
+            macs += (uint64_t)10u * p.count * b.terms * b.terms;
+        }
+        ctx->multipole.home_pixel[k] = home;
+    }
+    eits_pole_field(ctx, k, shape, own);
+    return macs;
 }
 
 void eits_pole_forget(eits_context *ctx)
@@ -223,30 +288,42 @@ int eits_pole_on_skin(const eits_context *ctx, eits_real x, eits_real y)
     return ctx->cell[(size_t)(uint32_t)y * model->nx + (uint32_t)x] != EITS_NO_PIXEL;
 }
 
-void eits_pole_field(const eits_context *ctx, uint32_t k, const eits_shape *shape, eits_real *out)
+/* a_n+1 of all electrodes from terms n, n + 1, ... of F: n is constant where this is called, so
+ * that the factors stay in registers. */
+static inline void shift_term(const eits_real *terms, const eits_complex *power, uint32_t n,
+                              uint32_t electrodes, eits_real *out)
 {
     static const eits_real binomial[EITS_POLE_TERMS][EITS_POLE_TERMS] = {
         {1}, {1, 1}, {1, 2, 1}, {1, 3, 3, 1}, {1, 4, 6, 4, 1}, {1, 5, 10, 10, 5, 1}};
+    const size_t width = 2u * (size_t)electrodes;
+    const eits_real share = 1 / (eits_real)(n + 1u); /* u is F's integral */
+    eits_complex s[EITS_POLE_TERMS];
+    for (uint32_t m = n; m < EITS_POLE_TERMS; ++m)
+        s[m] = eits_scaled(share * binomial[m][n], power[m - n]);
+    for (uint32_t e = 0; e < electrodes; ++e) {
+        const eits_real *re = terms + e, *im = re + electrodes;
+        eits_complex sum = {0, 0};
+        for (uint32_t m = EITS_POLE_TERMS; m-- > n;) /* the small ones first */
+            sum = eits_plus_times(sum, s[m], (eits_complex){re[width * m], im[width * m]});
+        out[width * n + e] = sum.re;
+        out[width * n + electrodes + e] = sum.im;
+    }
+}
+
+void eits_pole_field(const eits_context *ctx, uint32_t k, const eits_shape *shape, eits_real *out)
+{
     const eits_pixel at = ctx->model->pixel[ctx->multipole.home_pixel[k]];
     const eits_complex d = {shape->x - (eits_real)at.ix - R(0.5),
                             shape->y - (eits_real)at.iy - R(0.5)};
-    const uint32_t electrodes = ctx->model->n_electrodes, width = 2u * electrodes;
+    const uint32_t electrodes = ctx->model->n_electrodes;
     const eits_real *terms = ctx->multipole.home + EITS_POLE_FIELD(electrodes) * k;
     eits_complex power[EITS_POLE_TERMS] = {{1, 0}};
     for (uint32_t n = 1; n < EITS_POLE_TERMS; ++n)
         power[n] = eits_times(power[n - 1u], d);
-    for (uint32_t n = 0; n < EITS_POLE_TERMS; ++n) {
-        eits_real *re = out + (size_t)width * n, *im = re + electrodes;
-        const eits_real share = 1 / (eits_real)(n + 1u); /* u is F's integral */
-        eits_zero(re, width);
-        for (uint32_t m = EITS_POLE_TERMS; m-- > n;) { /* the small ones first */
-            const eits_real factor = share * binomial[m][n];
-            const eits_complex s = {factor * power[m - n].re, factor * power[m - n].im};
-            const eits_real *from = terms + (size_t)width * m;
-            for (uint32_t e = 0; e < electrodes; ++e) {
-                re[e] = eits_fma(s.re, from[e], eits_fma(-s.im, from[electrodes + e], re[e]));
-                im[e] = eits_fma(s.re, from[electrodes + e], eits_fma(s.im, from[e], im[e]));
-            }
-        }
-    }
+    shift_term(terms, power, 0, electrodes, out);
+    shift_term(terms, power, 1, electrodes, out);
+    shift_term(terms, power, 2, electrodes, out);
+    shift_term(terms, power, 3, electrodes, out);
+    shift_term(terms, power, 4, electrodes, out);
+    shift_term(terms, power, 5, electrodes, out);
 }

@@ -20,6 +20,7 @@ typedef struct eits_fit {
     /* the test of touches (evidence/touch_test.c): 1 where it was made */
     uint32_t tested;
     uint32_t changed; /* 1: the test has changed the discs */
+    uint32_t settled; /* 1: places and radii are fitted; 0: they are those of peaks */
     uint32_t joint;   /* 1: discs are as the joint fit has them, with sharp edges */
     uint32_t drifts;  /* 1: the data are likelier of a sheet that has drifted since its reference */
     /* minus twice the logarithm of the ratio of likelihoods without and with the disc, over the
@@ -122,6 +123,12 @@ void eits_fit_seek(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 void eits_fit_centre(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* touch.c */
+
+/* Peaks of the image as discs, each moved once. */
+void eits_fit_peaks(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
+
+/* The last stage of that fit alone, for discs whose places and radii are nearly right. */
+void eits_fit_settle(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* Peaks of the image start discs, which are fitted to the frame's data; f->count of them are
  * touches. */

@@ -113,6 +113,22 @@ static void begin(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
     eits_fit_prune(ctx, scratch, f);
 }
 
+void eits_fit_peaks(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
+{
+    const eits_options *o = &ctx->options;
+    f->radius_weight = o->touch_radius_weight;
+    f->data = ctx->frame.y;
+    seed(ctx, scratch, f);
+    eits_fit_strengths(ctx, scratch, f);
+    if (o->touch_change_s_per_m > 0) {
+        for (uint32_t k = 0; k < f->count; ++k)
+            f->disc[k].radius_mm = eits_expected_radius(o, &f->disc[k]);
+        eits_fit_strengths(ctx, scratch, f);
+    }
+    eits_fit_move_all(ctx, scratch, f, o->touch_sweeps < 1 ? o->touch_sweeps : 1);
+    eits_fit_prune(ctx, scratch, f);
+}
+
 void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     const int interacts = eits_has_interaction(ctx),
@@ -121,6 +137,7 @@ void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *
         (ctx->options.touch_fit & EITS_TOUCH_FIT_SPLIT_MERGE) != 0 && (linear || interacts);
     f->radius_weight = ctx->options.touch_radius_weight * (interacts ? EITS_EARLY_RADIUS : 1);
     begin(ctx, scratch, f);
+    f->settled = 1;
     /* Peaks and strengths only, as asked. */
     if (ctx->options.touch_sweeps == 0)
         return;
@@ -141,6 +158,17 @@ void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *
         eits_fit_prune(ctx, scratch, f);
     }
     f->radius_weight = ctx->options.touch_radius_weight * (interacts ? EITS_FINAL_RADIUS : 1);
+    remove_interaction(ctx, scratch, f);
+    eits_fit_move_all(ctx, scratch, f, later(ctx));
+    eits_fit_prune(ctx, scratch, f);
+}
+
+void eits_fit_settle(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
+{
+    const int interacts = eits_has_interaction(ctx);
+    f->settled = 1;
+    f->radius_weight = ctx->options.touch_radius_weight * (interacts ? EITS_FINAL_RADIUS : 1);
+    eits_fit_strengths(ctx, scratch, f);
     remove_interaction(ctx, scratch, f);
     eits_fit_move_all(ctx, scratch, f, later(ctx));
     eits_fit_prune(ctx, scratch, f);
