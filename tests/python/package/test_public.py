@@ -15,7 +15,7 @@ PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "python-api.
 
 
 def test_the_page_lists_what_is_public():
-    listed = re.findall(r"^### `(\w+)", PAGE.read_text("utf-8"), re.MULTILINE)
+    listed = re.findall(r"^## `(\w+)", PAGE.read_text("utf-8"), re.MULTILINE)
     assert sorted(listed) == sorted(eitskin.__all__) and set(eitskin.__all__) <= set(dir(eitskin))
     for name in eitskin.__all__:
         assert getattr(eitskin, name).__doc__
