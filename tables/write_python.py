@@ -18,6 +18,7 @@ FORMS = {
     "shown": ("str", '"solver"'),
     "negated": ("int", "0"),
     "flag": ("bool", "False"),
+    "unless": ("bool", "True"),
     "stages": ("dict[str, StageStats]", "{}"),
     "known": ("float | None", "None"),  # None: not known, 0 in C
     "one": ("int", "1"),  # a number, 1 where none is given

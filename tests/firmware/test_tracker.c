@@ -155,7 +155,7 @@ TEST(test_beginning_again)
     TARE(8);
     host_run(&b.host, 2 * SCAN_MS);
     CHECK(tracker->begun > begun && tracker->running);
-    STREAM(EITS_STREAM_TOUCHES, 1, 0);
+    STREAM(EITS_STREAM_RAW | EITS_STREAM_IMAGE, 1, 0);
     host_run(&b.host, 2 * SCAN_MS);
     CHECK(!tracker->running && b.host.instrument.acquire.scan.drive_done == NULL);
 }
@@ -169,12 +169,15 @@ TEST(test_a_place_that_frames_find)
     host_run(&b.host, 3 * SCAN_MS);
     fw_instrument *instrument = &b.host.instrument;
     fw_frame *frame = &instrument->solve.engine.frames[0];
-    const eits_touch found = {.x_mm = -2, .y_mm = 1, .strength_s_per_m_mm2 = 4};
     for (uint32_t round = 0; round < 2; ++round) {
         eits_info info = *eits_get_info(instrument->solve.engine.ctx);
         eits_fast_touch touches[EITS_FAST_TOUCHES];
         uint32_t count = 0;
-        fw_tracker_note(&instrument->solve, &found, 1, &info);
+        eits_touch found[EITS_MAX_TOUCHES] = {
+            {.id = 3, .x_mm = -2, .y_mm = 1, .strength_s_per_m_mm2 = 4, .explained = 0.5f}};
+        /* the second frame with it reports it */
+        CHECK_EQUAL(fw_tracker_note(&instrument->solve, found, 1, &info), round);
+        CHECK(round == 0 || found[0].id == EITS_FAST_FRAME_IDS + 3);
         for (uint32_t unsolved = 0; unsolved < 3 - 2 * round; ++unsolved) {
             instrument->solve.tracker.owed = true;
             instrument->solve.tracker.owed_frame = frame->number;
@@ -184,6 +187,61 @@ TEST(test_a_place_that_frames_find)
             eits_fast_touches(instrument->solve.engine.fast, touches, EITS_FAST_TOUCHES, &count));
         CHECK_EQUAL(count, round);
     }
+}
+
+/* Touches of frames are tracked although no reports are asked for; each frame has its touches, also
+ * one in whose scan a touch lands, with the ids of drives. */
+TEST(test_frames_alone)
+{
+    set_up(&SKIN_WITH_FIELDS);
+    STREAM(EITS_STREAM_RAW | EITS_STREAM_TOUCHES, 1, 0);
+    host_run(&b.host, 5 * SCAN_MS);
+    host_forget(&b.host);
+    touch(-2, 1, 4);
+    host_run(&b.host, 30 * SCAN_MS);
+    CHECK_EQUAL(host_count(&b.host, EITS_PACKET_DRIVE_TOUCHES), 0);
+    const uint32_t frames = host_count(&b.host, EITS_PACKET_RAW);
+    CHECK(frames >= 28);
+    CHECK(host_count(&b.host, EITS_PACKET_TOUCHES) + 1 >= frames);
+    CHECK(with_flags(EITS_RAW_ALIGNED) == frames);
+    CHECK(with_flags(EITS_RAW_ALIGNED | EITS_RAW_TRUSTED) < frames);
+    const host_packet *last = host_last(&b.host, EITS_PACKET_TOUCHES);
+    eits_packet_solved head;
+    memcpy(&head, last->payload, sizeof head);
+    CHECK(head.count >= 1);
+    uint32_t known = 0;
+    for (uint32_t k = 0; k < head.count; ++k) {
+        eits_packet_touch one;
+        memcpy(&one, last->payload + sizeof head + k * sizeof one, sizeof one);
+        known += one.id == b.host.instrument.solve.tracker.followed[0].id;
+    }
+    CHECK_EQUAL(known, 1);
+}
+
+/* Touches that drives follow and frames find are one; others are told apart by their ids. */
+TEST(test_report)
+{
+    const eits_fast_touch tracked[] = {
+        {.id = 4, .x_mm = 10, .strength_s_per_m_mm2 = 3, .radius_mm = 9, .x_variance_mm2 = 2},
+        {.id = 5, .x_mm = -40, .strength_s_per_m_mm2 = 8, .confirmed = 1}};
+    const eits_touch found[] = {
+        {.id = 1, .x_mm = 11, .strength_s_per_m_mm2 = 5, .explained = 1, .x_variance_mm2 = 1},
+        {.id = 2, .x_mm = 60, .strength_s_per_m_mm2 = 4, .explained = 1}};
+    eits_touch out[EITS_MAX_TOUCHES];
+    uint32_t count = 0;
+    CHECK_OK(eits_fast_report(tracked, 2, found, 2, NULL, 0, out, &count));
+    CHECK_EQUAL(count, 2); /* the one at 60 waits for a second frame */
+    CHECK(out[0].id == 5 && out[0].confirmed == 1 && out[0].explained == 0);
+    CHECK(out[1].id == 4 && out[1].confirmed == 1 && out[1].x_mm == 11 &&
+          out[1].x_variance_mm2 == 1);
+    CHECK_OK(eits_fast_report(tracked, 2, found, 2, found, 2, out, &count));
+    CHECK_EQUAL(count, 3);
+    CHECK_EQUAL(out[2].id, EITS_FAST_FRAME_IDS + 2);
+    CHECK_OK(eits_fast_report(tracked, 2, NULL, 0, NULL, 0, out, &count));
+    CHECK(count == 2 && out[1].confirmed == 0 && out[1].radius_mm == 9 &&
+          out[1].x_variance_mm2 == 2);
+    CHECK_EQUAL(eits_fast_report(tracked, 7, NULL, 0, NULL, 0, out, &count), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_report(tracked, 2, found, 2, NULL, 0, NULL, &count), EITS_E_ARGUMENT);
 }
 
 int main(void)

@@ -186,6 +186,8 @@ typedef struct eits_touch {
      * one expected of touches of this strength, and the change of conductivity, the strength over
      * the area, is not known either */
     eits_real radius_sd_mm;
+    /* 1: a whole frame has shown it; 0: only drives have (fast.h) */
+    uint32_t confirmed;
 } eits_touch;
 
 /* A name for one bit of eits_diagnostic ("electrode open", "outlier"...), never NULL. */

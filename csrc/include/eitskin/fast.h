@@ -33,12 +33,17 @@ extern "C" {
 
 /* A touch at the time of the middle of the last drive. */
 typedef struct eits_fast_touch {
-    uint32_t id;        /* from 1, as long as it is followed; apart from those of eits_touch */
+    uint32_t id;        /* from 1, as long as it is followed */
     uint32_t confirmed; /* 1: a whole frame has shown it */
     eits_real x_mm, y_mm;
     eits_real vx_mm_per_s, vy_mm_per_s;
     eits_real strength_s_per_m_mm2;
+    eits_real radius_mm;                                         /* of the disc it is taken for */
+    eits_real x_variance_mm2, xy_covariance_mm2, y_variance_mm2; /* of its place */
 } eits_fast_touch;
+
+/* Ids of touches that whole frames alone show are greater than this. */
+#define EITS_FAST_FRAME_IDS 65536u
 
 /* Bits that eits_fast_align sets for a frame. */
 typedef enum eits_fast_frame {
@@ -172,6 +177,15 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
  * gain drifted by .3 % in two consecutive frames. Call it once per solved frame. Errors:
  * EITS_E_ARGUMENT. */
 eits_status eits_fast_name(eits_fast *fast, eits_info *info);
+
+/* Write a frame's touches, the strongest first, into `touches`, which has room for
+ * EITS_MAX_TOUCHES: those of eits_fast_touches after the frame was aligned, `tracked`, with what
+ * the solver `found` of them in that frame. A touch that it found and drives do not follow is
+ * reported if the solver also found it in the frame `before`; its id is then greater than
+ * EITS_FAST_FRAME_IDS. Where the frame was not solved, n_found is 0. Errors: EITS_E_ARGUMENT. */
+eits_status eits_fast_report(const eits_fast_touch *tracked, uint32_t n_tracked,
+                             const eits_touch *found, uint32_t n_found, const eits_touch *before,
+                             uint32_t n_before, eits_touch *touches, uint32_t *count);
 
 #ifdef __cplusplus
 }

@@ -213,7 +213,9 @@ typedef enum eits_raw_flags {
     /* the touches after each drive brought it to the instant of its last drive */
     EITS_RAW_ALIGNED = 8,
     /* and it was solved: its drives are accounted for */
-    EITS_RAW_TRUSTED = 16
+    EITS_RAW_TRUSTED = 16,
+    /* the tracker of touches began with it */
+    EITS_RAW_BEGUN = 32
 } eits_raw_flags;
 
 /* Bits of what is streamed of each frame. */
@@ -226,7 +228,7 @@ typedef enum eits_stream {
     EITS_STREAM_TOUCHES = 4,
     /* its events, as EVENTS, also where there are none; a tare forgets fingers */
     EITS_STREAM_EVENTS = 8,
-    /* touches after each drive, as DRIVE_TOUCHES; of frames only trusted ones are solved */
+    /* touches after each drive, as DRIVE_TOUCHES */
     EITS_STREAM_DRIVE_TOUCHES = 16
 } eits_stream;
 
@@ -431,6 +433,8 @@ typedef struct eits_packet_touch {
     float long_y_mm;
     /* standard deviation of the radius; 0: the data do not tell the radius */
     float radius_sd_mm;
+    /* 1: a whole frame has shown it */
+    uint32_t confirmed;
 } eits_packet_touch;
 
 /* Touches as of an instant within a scan. Where nothing touches it is sent once: when that begins,
@@ -454,7 +458,7 @@ typedef struct eits_packet_drive_touches {
 
 /* A touch, as eits_fast_touch. */
 typedef struct eits_packet_drive_touch {
-    /* from 1, apart from those of TOUCHES; stays with a touch */
+    /* from 1, as in TOUCHES; stays with a touch */
     uint16_t id;
     /* 1: a whole frame has shown it */
     uint16_t confirmed;
@@ -467,6 +471,12 @@ typedef struct eits_packet_drive_touch {
     float vy_mm_per_s;
     /* S mm^2/m */
     float strength_s_per_m_mm2;
+    /* of the disc that it is taken for */
+    float radius_mm;
+    /* covariance of the centre */
+    float x_variance_mm2;
+    float xy_covariance_mm2;
+    float y_variance_mm2;
 } eits_packet_drive_touch;
 
 /* Events of a frame; there are none if the core rejected it. */

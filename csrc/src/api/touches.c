@@ -134,6 +134,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     ctx->info.shown = shown(ctx, &f, finite, found, reported);
     for (uint32_t k = 0; k < reported; ++k) {
         eits_bring_onto_skin(ctx, &found[k].x_mm, &found[k].y_mm);
+        found[k].confirmed = 1;
         found[k].force_n =
             eits_force_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
     }

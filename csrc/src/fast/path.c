@@ -258,17 +258,23 @@ eits_status eits_fast_touches(const eits_fast *fast, eits_fast_touch *touches, u
     *count = 0;
     for (uint32_t k = 0; k < fast->count && *count < room; ++k) {
         const fast_known *known = &fast->known[k];
-        const eits_real *state = fast->state + FAST_SIZE * k;
+        const uint32_t first = FAST_SIZE * k;
+        const eits_real *state = fast->state + first;
         eits_real at[2] = {state[FAST_X], state[FAST_Y]};
         eits_place_on_skin(fast->ctx, at);
         if (known->on)
-            touches[(*count)++] = (eits_fast_touch){.id = known->id,
-                                                    .confirmed = known->confirmed,
-                                                    .x_mm = at[0],
-                                                    .y_mm = at[1],
-                                                    .vx_mm_per_s = state[FAST_VX],
-                                                    .vy_mm_per_s = state[FAST_VY],
-                                                    .strength_s_per_m_mm2 = state[FAST_C]};
+            touches[(*count)++] = (eits_fast_touch){
+                .id = known->id,
+                .confirmed = known->confirmed,
+                .x_mm = at[0],
+                .y_mm = at[1],
+                .vx_mm_per_s = state[FAST_VX],
+                .vy_mm_per_s = state[FAST_VY],
+                .strength_s_per_m_mm2 = state[FAST_C],
+                .radius_mm = (eits_real)fast->model->defaults->touch_seed_radius_mm,
+                .x_variance_mm2 = fast->p[first + FAST_X][first + FAST_X],
+                .xy_covariance_mm2 = fast->p[first + FAST_Y][first + FAST_X],
+                .y_variance_mm2 = fast->p[first + FAST_Y][first + FAST_Y]};
     }
     return EITS_OK;
 }

@@ -43,10 +43,10 @@ static bool due(fw_stream *stream)
 }
 
 static void send_solved(fw_host_link *link, const fw_frame *frame, eits_packet_solved *head,
-                        const eits_touch *touches, uint32_t count)
+                        const eits_touch *touches, uint32_t count, bool image)
 {
     const uint32_t pixels = fw_solve_model(link->solve)->n_pixels;
-    if ((link->stream.what & EITS_STREAM_IMAGE) != 0) {
+    if (image && (link->stream.what & EITS_STREAM_IMAGE) != 0) {
         head->count = (uint16_t)pixels;
         head->age_us = fw_now_us(link->board) - frame->end_us;
         (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_IMAGE, head, sizeof *head,
@@ -69,7 +69,8 @@ static void send_solved(fw_host_link *link, const fw_frame *frame, eits_packet_s
                                           .y_variance_mm2 = t.y_variance_mm2,
                                           .long_x_mm = t.long_x_mm,
                                           .long_y_mm = t.long_y_mm,
-                                          .radius_sd_mm = t.radius_sd_mm};
+                                          .radius_sd_mm = t.radius_sd_mm,
+                                          .confirmed = t.confirmed};
         }
         head->count = (uint16_t)count;
         head->age_us = fw_now_us(link->board) - frame->end_us;
@@ -109,16 +110,24 @@ static uint32_t solve(fw_host_link *link, const fw_frame *frame, const float *vo
                       const fw_quality *quality)
 {
     fw_solved solved;
-    const bool touches = (link->stream.what & (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS |
-                                               EITS_STREAM_DRIVE_TOUCHES)) != 0;
+    const bool touches = (link->stream.what & FW_TRACKED) != 0;
     fw_frame_solve(link->solve, frame, volts, quality, touches, &solved);
     const uint32_t solve_us = solved.head.solve_us, touch_us = solved.head.touch_us;
     fw_stats_add(&link->stats, EITS_STAGE_SOLVE, solve_us);
     if (touches)
         fw_stats_add(&link->stats, EITS_STAGE_TOUCHES, touch_us);
-    send_solved(link, frame, &solved.head, solved.touches, solved.count);
+    send_solved(link, frame, &solved.head, solved.touches, solved.count, true);
     send_events(link, frame, solved.status, solved.touches, solved.count);
     return solve_us + touch_us;
+}
+
+/* A frame that must not be solved has the touches that drives follow, and no image. */
+static void follow(fw_host_link *link, const fw_frame *frame)
+{
+    fw_solved solved;
+    fw_frame_follow(link->solve, frame, &solved);
+    send_solved(link, frame, &solved.head, solved.touches, solved.count, false);
+    send_events(link, frame, solved.status, solved.touches, solved.count);
 }
 
 static void check_deadline(fw_host_link *link, const fw_frame *frame, uint32_t now_us)
@@ -157,12 +166,15 @@ static void stream(fw_host_link *link, fw_frame *frame, const fw_quality *qualit
 {
     const uint32_t what = link->stream.what;
     const bool solved = fw_solve_tared(link->solve) && (what & ~(uint32_t)EITS_STREAM_RAW) != 0;
-    const bool tracked = (what & EITS_STREAM_DRIVE_TOUCHES) != 0;
     const uint32_t began_us = fw_now_us(link->board);
-    const float *volts = tracked ? fw_tracks_align(link, frame) : frame->volts;
+    const float *aligned = fw_tracks_align(link, frame);
+    const bool unsolved = (frame->flags & EITS_RAW_ALIGNED) != 0 && aligned == NULL;
+    const float *volts = aligned != NULL ? aligned : frame->volts;
     uint32_t solving_us = 0;
     send_raw(link, frame, 0);
-    if (solved && volts != NULL)
+    if (solved && unsolved)
+        follow(link, frame);
+    else if (solved)
         solving_us = solve(link, frame, volts, quality);
     else if (!solved)
         fw_frame_examine(link->solve, frame, quality);

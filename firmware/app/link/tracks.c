@@ -8,8 +8,8 @@
 
 static bool wanted(const fw_host_link *link)
 {
-    return (link->stream.what & EITS_STREAM_DRIVE_TOUCHES) != 0 && fw_tracker_ready(link->solve) &&
-           !fw_current_settling(link->safety);
+    return (link->stream.what & FW_TRACKED) != 0 && link->stream.every == 1 &&
+           fw_tracker_ready(link->solve) && !fw_current_settling(link->safety);
 }
 
 static uint16_t short_us(uint32_t us)
@@ -29,7 +29,11 @@ static void send(fw_host_link *link, const fw_scan_drive *drive, const fw_track_
                                             .y_mm = t->y_mm,
                                             .vx_mm_per_s = t->vx_mm_per_s,
                                             .vy_mm_per_s = t->vy_mm_per_s,
-                                            .strength_s_per_m_mm2 = t->strength_s_per_m_mm2};
+                                            .strength_s_per_m_mm2 = t->strength_s_per_m_mm2,
+                                            .radius_mm = t->radius_mm,
+                                            .x_variance_mm2 = t->x_variance_mm2,
+                                            .xy_covariance_mm2 = t->xy_covariance_mm2,
+                                            .y_variance_mm2 = t->y_variance_mm2};
     }
     const uint32_t now_us = fw_now_us(link->board);
     const eits_packet_drive_touches head = {.frame = drive->frame,
@@ -50,7 +54,8 @@ static void track(fw_host_link *link, const fw_scan_drive *drive)
     const uint32_t began_us = fw_now_us(link->board);
     if (!fw_tracker_take(link->solve, drive, &update))
         return;
-    if (update.first || update.count > 0 || link->tracks.reported > 0)
+    if ((link->stream.what & EITS_STREAM_DRIVE_TOUCHES) != 0 &&
+        (update.first || update.count > 0 || link->tracks.reported > 0))
         send(link, drive, &update, began_us);
     link->tracks.reported = update.count;
 }
@@ -103,8 +108,8 @@ void fw_tracks_release(fw_host_link *link)
 
 void fw_tracks_restart(fw_host_link *link)
 {
-    const bool on =
-        (link->stream.what & EITS_STREAM_DRIVE_TOUCHES) != 0 && fw_tracker_possible(link->solve);
+    const bool on = (link->stream.what & FW_TRACKED) != 0 && link->stream.every == 1 &&
+                    fw_tracker_possible(link->solve);
     fw_tracker_forget(link->solve);
     fw_acquire_report_drives(link->acquire, on ? go_on : NULL, link);
 }

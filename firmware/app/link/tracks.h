@@ -1,4 +1,5 @@
-/* Sends the touches after each drive (solve/tracker.h).
+/* Tracks touches wherever touches or events of each frame are streamed, and sends those after each
+ * drive if the host asks for them (solve/tracker.h).
  *
  * Drives are tracked between the capture's interrupt and the main loop, so that a solve does not
  * delay them. While the main loop changes what the tracker reads, or while a packet is under way,
@@ -12,6 +13,9 @@ typedef struct fw_host_link fw_host_link;
 
 void fw_tracks_init(fw_host_link *link);
 
+/* What of a stream asks for touches. */
+#define FW_TRACKED (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS | EITS_STREAM_DRIVE_TOUCHES)
+
 /* Drives wait until the release. */
 void fw_tracks_hold(fw_host_link *link);
 void fw_tracks_release(fw_host_link *link);
@@ -22,7 +26,8 @@ void fw_tracks_restart(fw_host_link *link);
 /* The main loop has taken a frame, or is done with it. */
 void fw_tracks_at_frame(fw_host_link *link, bool taken);
 
-/* The aligned voltages of the frame that was taken; NULL if it must not be solved. */
+/* The aligned voltages of the frame that was taken; NULL if it was not aligned, or must not be
+ * solved. */
 const float *fw_tracks_align(fw_host_link *link, fw_frame *frame);
 
 #endif

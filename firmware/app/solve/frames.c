@@ -107,7 +107,7 @@ void fw_frame_solve(fw_solve *solve, const fw_frame *frame, const float *volts,
         (void)eits_find_touches(ctx, out->touches, EITS_MAX_TOUCHES, &out->count);
     eits_info info = *eits_get_info(ctx);
     if (volts != frame->volts && out->status == EITS_OK)
-        fw_tracker_note(solve, out->touches, out->count, &info);
+        out->count = fw_tracker_note(solve, out->touches, out->count, &info);
     const uint32_t done_us = fw_now_us(solve->board);
     out->head = head_of(frame, &info, out->status);
     out->head.solve_us = solved_us - began_us;
@@ -118,6 +118,16 @@ void fw_frame_solve(fw_solve *solve, const fw_frame *frame, const float *volts,
     fw_fault_set(solve->safety, EITS_FAULT_SOLVER, out->status != EITS_OK,
                  (fw_fault_detail){.value = (int32_t)out->status});
     report_diagnostics(solve, &info, out->status == EITS_OK);
+}
+
+void fw_frame_follow(fw_solve *solve, const fw_frame *frame, fw_solved *out)
+{
+    out->count = fw_tracker_report(solve, out->touches);
+    const eits_info info = {.touches = out->count,
+                            .shown = out->count > 0 ? EITS_SHOWN_TOUCHES : EITS_SHOWN_SOLVER};
+    out->status = EITS_OK;
+    out->head = head_of(frame, &info, EITS_OK);
+    solve->touched = out->count > 0;
 }
 
 void fw_frames_forget(fw_solve *solve)

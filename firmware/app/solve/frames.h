@@ -27,6 +27,9 @@ void fw_frame_examine(fw_solve *solve, const fw_frame *frame, const fw_quality *
 void fw_frame_solve(fw_solve *solve, const fw_frame *frame, const float *volts,
                     const fw_quality *quality, bool touches, fw_solved *out);
 
+/* For a frame that must not be solved: the touches that drives follow. */
+void fw_frame_follow(fw_solve *solve, const fw_frame *frame, fw_solved *out);
+
 /* Reciprocal rows are judged from the next frame on, whatever earlier ones showed. */
 void fw_frames_forget(fw_solve *solve);
 

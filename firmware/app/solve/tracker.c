@@ -119,10 +119,14 @@ bool fw_tracker_align(fw_solve *solve, fw_frame *frame, const float **volts)
     tracker->noted = false;
     const eits_status status =
         eits_fast_align(engine->fast, frame->volts, engine->model.n_rows, engine->aligned, &state);
+    (void)eits_fast_touches(engine->fast, tracker->followed, EITS_FAST_TOUCHES,
+                            &tracker->n_followed);
     tracker->owed = false;
     if (status != EITS_OK)
         return true;
     frame->flags |= EITS_RAW_ALIGNED;
+    if (tracker->begun == frame->number)
+        frame->flags |= EITS_RAW_BEGUN;
     if ((state & EITS_FAST_TRUSTED) != 0) {
         frame->flags |= EITS_RAW_TRUSTED;
         *volts = engine->aligned;
@@ -130,11 +134,41 @@ bool fw_tracker_align(fw_solve *solve, fw_frame *frame, const float **volts)
     return true;
 }
 
-void fw_tracker_note(fw_solve *solve, const eits_touch *touches, uint32_t count, eits_info *info)
+/* Touches that the core holds although this frame does not show them were not found in it. */
+static uint32_t only_found(eits_touch *touches, uint32_t count)
+{
+    uint32_t kept = 0;
+    for (uint32_t k = 0; k < count; ++k) {
+        if (touches[k].explained > 0)
+            touches[kept++] = touches[k];
+    }
+    return kept;
+}
+
+uint32_t fw_tracker_note(fw_solve *solve, eits_touch *touches, uint32_t count, eits_info *info)
 {
     fw_tracker *tracker = &solve->tracker;
+    eits_touch reported[EITS_MAX_TOUCHES];
+    uint32_t reports = 0;
+    count = only_found(touches, count);
+    (void)eits_fast_report(tracker->followed, tracker->n_followed, touches, count, tracker->touches,
+                           tracker->count, reported, &reports);
     memcpy(tracker->touches, touches, count * sizeof touches[0]);
     tracker->count = count;
     tracker->noted = true;
     (void)eits_fast_name(solve->engine.fast, info);
+    if (reports < count) /* the touches' image would lack one */
+        info->shown = EITS_SHOWN_SOLVER;
+    info->touches = reports;
+    memcpy(touches, reported, reports * sizeof touches[0]);
+    return reports;
+}
+
+uint32_t fw_tracker_report(const fw_solve *solve, eits_touch *touches)
+{
+    const fw_tracker *tracker = &solve->tracker;
+    uint32_t count = 0;
+    (void)eits_fast_report(tracker->followed, tracker->n_followed, NULL, 0, NULL, 0, touches,
+                           &count);
+    return count;
 }

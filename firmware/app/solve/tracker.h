@@ -44,8 +44,12 @@ bool fw_tracker_at_frame(fw_solve *solve, bool taken);
  * if it must not be solved. Returns whether drives need no longer wait. */
 bool fw_tracker_align(fw_solve *solve, fw_frame *frame, const float **volts);
 
-/* The touches of that frame; the tracker uses them at the end of the next one. What must not be
- * reported is removed from `info`. */
-void fw_tracker_note(fw_solve *solve, const eits_touch *touches, uint32_t count, eits_info *info);
+/* The touches that the solver found in that frame; the tracker uses them at the end of the next
+ * one. They become those that are reported, whose number is returned; `touches` has room for
+ * EITS_MAX_TOUCHES. What must not be reported is removed from `info`. */
+uint32_t fw_tracker_note(fw_solve *solve, eits_touch *touches, uint32_t count, eits_info *info);
+
+/* The touches of a frame that was aligned and not solved. Returns their number. */
+uint32_t fw_tracker_report(const fw_solve *solve, eits_touch *touches);
 
 #endif

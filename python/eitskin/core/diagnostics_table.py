@@ -92,3 +92,4 @@ class Touch:
     # one expected of touches of this strength, and the change of conductivity, the strength over
     # the area, is not known either
     radius_sd_mm: float | None = None
+    confirmed: bool = True  # 1: a whole frame has shown it; 0: only drives have (fast.h)

@@ -4,6 +4,7 @@ host."""
 import importlib
 import struct
 import threading
+from collections.abc import Sequence
 from dataclasses import asdict, fields
 from time import perf_counter_ns
 from typing import Any, NoReturn
@@ -254,7 +255,7 @@ class CoreEngine:
                 self._context, self._touches, len(self._touches), self._touch_count
             )
             found_ns = perf_counter_ns()
-            found = tuple(_touch(self._touches[k]) for k in range(self._touch_count[0]))
+            found = tuple(touch_of(self._touches[k]) for k in range(self._touch_count[0]))
         coefficients = self.coefficients()
         info = _info(self._info, solved_ns - began_ns, found_ns - solved_ns)
         drawn = self._drawn(self._touches, len(found), info)
@@ -319,7 +320,7 @@ class CoreEngine:
                     )
                 )
                 continue
-            each = tuple(_touch(found[room * k + i]) for i in range(r.count))
+            each = tuple(touch_of(found[room * k + i]) for i in range(r.count))
             info = _info(r.info)
             drawn = self._drawn(found + room * k, r.count, info) if touches else None
             done.append(Reconstruction(images[k], coefficients[k], each, info, touch_image=drawn))
@@ -379,5 +380,10 @@ def _bits(word: int) -> tuple[int, ...]:
     return tuple(bit for bit in range(64) if word >> bit & 1) if word else ()
 
 
-def _touch(t: Any) -> Touch:
+def touch_of(t: Any) -> Touch:
     return known_touch([getattr(t, name) for name in _TOUCH_NAMES])
+
+
+def c_touches(touches: Sequence[Touch]) -> list[dict[str, Any]]:
+    """Return ``touches`` as eits_touch takes them: 0 where something is not known."""
+    return [{name: getattr(one, name) or 0 for name in _TOUCH_NAMES} for one in touches]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from eitskin.arrays import AnyArray, IntArray
 from eitskin.core.diagnostics_table import Touch
-from eitskin.core.engine import CoreEngine, aligned
+from eitskin.core.engine import CoreEngine, aligned, c_touches, touch_of
 from eitskin.core.results import Info
 from eitskin.errors import FrameError, UsageError
 from eitskin.threads import one_at_a_time, refuse_copy
@@ -27,6 +27,10 @@ class FastTouch:
     vy_mm_per_s: float
     strength_s_per_m_mm2: float
     confirmed: bool
+    radius_mm: float
+    x_variance_mm2: float
+    xy_covariance_mm2: float
+    y_variance_mm2: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +71,8 @@ class FastCore:
         self._check(self._lib.eits_fast_init(memory, self.bytes, context, state))
         self._state = state[0]
         self._touches = self._ffi.new("eits_fast_touch[]", int(self._lib.EITS_FAST_TOUCHES))
+        self._followed = self._ffi.new("eits_fast_touch[]", int(self._lib.EITS_FAST_TOUCHES))
+        self._n_followed = 0
         self._number = self._ffi.new("uint32_t *")
         self.rows = [self._rows_of(k) for k in range(self._lib.eits_fast_drives(self._state))]
 
@@ -114,7 +120,8 @@ class FastCore:
         return [
             FastTouch(
                 int(one.id), one.x_mm, one.y_mm, one.vx_mm_per_s, one.vy_mm_per_s,
-                one.strength_s_per_m_mm2, bool(one.confirmed),
+                one.strength_s_per_m_mm2, bool(one.confirmed), one.radius_mm,
+                one.x_variance_mm2, one.xy_covariance_mm2, one.y_variance_mm2,
             )
             for one in self._touches[0 : self._number[0]]
         ]  # fmt: skip
@@ -133,6 +140,12 @@ class FastCore:
             self._lib.eits_fast_align(self._state, pointer, given.size, pointer, self._number)
         )
         state = self._number[0]
+        self._check(
+            self._lib.eits_fast_touches(
+                self._state, self._followed, len(self._followed), self._number
+            )
+        )
+        self._n_followed = int(self._number[0])
         return AlignedFrame(
             given,
             bool(state & self._lib.EITS_FAST_EXPLAINED),
@@ -153,6 +166,29 @@ class FastCore:
         )
         self._check(self._lib.eits_fast_confirm(self._state, given, len(found)))
         return self.touches()
+
+    @one_at_a_time
+    def report(self, found: Sequence[Touch], before: Sequence[Touch]) -> tuple[Touch, ...]:
+        """Return the touches of the last aligned frame, the strongest first: those that drives
+        followed then, with what the engine ``found`` of them in it; nothing, where it was not
+        solved. A touch that it found and drives do not follow is reported if it was also found in
+        the frame ``before``.
+
+        Raises:
+            FrameError: there are more touches than the core can report.
+        """
+        room = int(self._lib.EITS_MAX_TOUCHES)
+        touches = self._ffi.new("eits_touch[]", room)
+        given, last = (
+            self._ffi.new("eits_touch[]", c_touches(each) or 1) for each in (found, before)
+        )
+        self._check(
+            self._lib.eits_fast_report(
+                self._followed, self._n_followed, given, len(found), last, len(before), touches,
+                self._number,
+            )
+        )  # fmt: skip
+        return tuple(touch_of(touches[k]) for k in range(self._number[0]))
 
     @one_at_a_time
     def named(self, found: Info) -> Info:

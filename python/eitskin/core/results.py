@@ -155,13 +155,14 @@ class Info(InfoFields):
         return values | {"diagnostics": list(self.diagnostics_by_name), "found": list(self.found)}
 
 
-_MAY_BE_UNKNOWN = [kind == float | None for kind in get_type_hints(Touch).values()]
+# all but the last one, `confirmed`
+_MAY_BE_UNKNOWN = [kind == float | None for kind in get_type_hints(Touch).values()][:-1]
 
 
 def known_touch(values: Sequence[Any]) -> Touch:
     """Return a touch from the fields of eits_touch in order. Fields that are 0 because they are
     unknown become None."""
-    whole = list(values)
+    *whole, confirmed = values
     first = _MAY_BE_UNKNOWN.index(True)
     if not whole[first]:
         whole[first] = None
@@ -171,7 +172,7 @@ def known_touch(values: Sequence[Any]) -> Touch:
         whole[-3:-1] = [None, None]
     if not whole[-1]:  # the data do not tell the radius
         whole[-1] = None
-    return Touch(*whole)
+    return Touch(*whole, bool(confirmed))
 
 
 def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: float) -> str:

@@ -1,11 +1,12 @@
 """``lsl:[NAME][?touches=N]``: publish a stream of the Lab Streaming Layer with one sample per
 frame.
 
-The float32 channels are the number of touches, then id, x_mm, y_mm, radius_mm, strength and force_n
-of the N strongest touches (8 by default), NaN for missing ones. With ``--report drive`` a second
-stream, NAME-drives, starts at the first report. Its double64 channels are time_s and the number of
-touches, then id, confirmed, x_mm, y_mm, vx_mm_per_s, vy_mm_per_s and strength of each. Both streams
-are irregular.
+The float32 channels are the number of touches, then id, x_mm, y_mm, radius_mm, strength, force_n,
+confirmed and the covariance of the place (x_variance_mm2, xy_covariance_mm2, y_variance_mm2) of the
+N strongest touches (8 by default), NaN for missing ones. With ``--report drive`` a second stream,
+NAME-drives, starts at the first report. Its double64 channels are time_s and the number of touches,
+then id, confirmed, x_mm, y_mm, vx_mm_per_s, vy_mm_per_s, strength and the covariance of each. Both
+streams are irregular.
 """
 
 import os
@@ -17,8 +18,14 @@ from eitskin.errors import SinkError, UsageError, missing_extra
 from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, or_nan, setting
 
 QUIET = "[log]\nlevel = -2\n"  # liblsl prints errors only
-FIELDS = ("id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n")
-MOVING = ("id", "confirmed", "x_mm", "y_mm", "vx_mm_per_s", "vy_mm_per_s", "strength_s_per_m_mm2")
+COVARIANCE = ("x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2")
+FIELDS = (
+    "id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "force_n", "confirmed", *COVARIANCE,
+)  # fmt: skip
+MOVING = (
+    "id", "confirmed", "x_mm", "y_mm", "vx_mm_per_s", "vy_mm_per_s", "strength_s_per_m_mm2",
+    *COVARIANCE,
+)  # fmt: skip
 UNITS = {
     "time_s": "s", "x_mm": "mm", "y_mm": "mm", "radius_mm": "mm", "force_n": "N",
     "vx_mm_per_s": "mm/s", "vy_mm_per_s": "mm/s",

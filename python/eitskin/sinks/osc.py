@@ -1,10 +1,11 @@
 """``osc://HOST:PORT[/prefix]``: send a bundle of OSC messages per frame over UDP.
 
 The messages of a frame are /eitskin/frame number time_s touches; for each touch /eitskin/touch id
-x_mm y_mm radius_mm strength force_n confidence (nil if unknown); and /eitskin/event kind x_mm y_mm
-direction_deg value zone touch_ids... After a drive, /eitskin/drive frame drive time_s touches is
-sent, then for each touch /eitskin/moving id x_mm y_mm vx_mm_per_s vy_mm_per_s strength. Notices are
-sent as /eitskin/notice kind text.
+x_mm y_mm radius_mm strength force_n confidence confirmed xx xy yy (nil if unknown; xx, xy, yy: the
+covariance of the place in mm^2); and /eitskin/event kind x_mm y_mm direction_deg value zone
+touch_ids... After a drive, /eitskin/drive frame drive time_s touches is sent, then for each touch
+/eitskin/moving id x_mm y_mm vx_mm_per_s vy_mm_per_s strength confirmed xx xy yy. Notices are sent
+as /eitskin/notice kind text.
 """
 
 from importlib.util import find_spec
@@ -14,6 +15,8 @@ from eitskin.errors import missing_extra
 from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
 from eitskin.sinks.udp import connected, send
 
+# how sure a touch is
+SURE = ("confirmed", "x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2")
 USAGE = "osc://HOST:PORT or osc://HOST:PORT/prefix"
 
 
@@ -60,7 +63,7 @@ def osc_messages(message: dict[str, Any]) -> list[tuple[str, list[Any]]]:
         return [("/notice", [message["kind"], message["text"]])]
     if message["type"] == "report":
         head = [message["frame"] & 0x7FFFFFFF, message["drive"], float(message["time_s"])]
-        names = ("id", "x_mm", "y_mm", "vx_mm_per_s", "vy_mm_per_s", "strength_s_per_m_mm2")
+        names = ("id", "x_mm", "y_mm", "vx_mm_per_s", "vy_mm_per_s", "strength_s_per_m_mm2", *SURE)
         moving = [("/moving", [one[name] for name in names]) for one in message["touches"]]
         return [("/drive", [*head, len(moving)]), *moving]
     if message["type"] != "frame":
@@ -72,7 +75,7 @@ def osc_messages(message: dict[str, Any]) -> list[tuple[str, list[Any]]]:
     for t in touches:
         place = [t["id"], t["x_mm"], t["y_mm"], t["radius_mm"]]
         known = [t["strength_s_per_m_mm2"], t["force_n"], t["confidence"]]
-        listed.append(("/touch", place + known))
+        listed.append(("/touch", place + known + [t[name] for name in SURE]))
     for event in message["events"]:
         values = [
             event[name] for name in ("kind", "x_mm", "y_mm", "direction_deg", "value", "zone")

@@ -83,6 +83,7 @@ def touch_array(message: Table, time_ns: int, frame_id: str) -> Table:
             "id": touch["id"],
             **{name: _known(touch[name]) for name in NUMBERS},
             "covariance_mm2": [_known(touch[name]) for name in COVARIANCE],
+            "confirmed": touch["confirmed"],
         }
         for touch in message["touches"] or []
     ]
@@ -97,8 +98,13 @@ def touch_array(message: Table, time_ns: int, frame_id: str) -> Table:
 
 def report(message: Table, time_ns: int, frame_id: str) -> Table:
     """Return the eitskin_msgs/Report for a message of touches after a drive."""
-    head = {name: message[name] for name in ("frame", "drive", "time_s", "touches")}
-    return {"header": header(time_ns, frame_id)} | head
+    head = {name: message[name] for name in ("frame", "drive", "time_s")}
+    touches = [
+        {name: value for name, value in touch.items() if name not in COVARIANCE}
+        | {"covariance_mm2": [touch[name] for name in COVARIANCE]}
+        for touch in message["touches"]
+    ]
+    return {"header": header(time_ns, frame_id)} | head | {"touches": touches}
 
 
 def image(grid: Grid, values: "npt.ArrayLike", time_ns: int, frame_id: str) -> Table:

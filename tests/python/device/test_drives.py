@@ -131,7 +131,7 @@ def test_half_scans_are_refused(scene, scan):
 
 
 HEAD = DriveTouchesHead(3, 100, 2, 50, 40, 5, 1)
-TOUCH = DriveTouch(1, True, 1.0, 2.0, 3.0, 4.0, 5.0)
+TOUCH = DriveTouch(1, True, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)
 GOOD = pack(HEAD) + pack(TOUCH)
 
 

@@ -198,12 +198,13 @@ def test_touches_of_a_board_that_does_not_tell_deviations_of_radii_are_read():
     today = build_touches(pk.SolvedTouches(solved(2), tuple(each)))
     old = pl.pack(solved(2)) + b"".join(
         today[start : start + pl.OLDEST_TOUCH_BYTES]
-        for start in range(len(pl.pack(solved(2))), len(today), pl.OLDEST_TOUCH_BYTES + 4)
+        for start in range(len(pl.pack(solved(2))), len(today), link.TouchPacket.LAYOUT.size)
     )
     kind = link.PacketType.TOUCHES
     older, newer = pl.parse(kind, old), pl.parse(kind, today)
     assert [touch.id for touch in older.touches] == [touch.id for touch in newer.touches] == [1, 2]
     assert [touch.radius_mm for touch in older.touches] == [8.0, 8.0]
+    assert all(touch.confirmed for touch in older.touches)
     assert [touch.radius_sd_mm for touch in older.touches] == [None, None]
 
 

@@ -166,6 +166,7 @@ class RawFlags(IntFlag):
     CHECK = 4  # a full scan among such, for the check of reciprocity
     ALIGNED = 8  # the touches after each drive brought it to the instant of its last drive
     TRUSTED = 16  # and it was solved: its drives are accounted for
+    BEGUN = 32  # the tracker of touches began with it
 
 
 class Stream(IntFlag):
@@ -175,8 +176,7 @@ class Stream(IntFlag):
     IMAGE = 2  # its image, as an IMAGE
     TOUCHES = 4  # its touches, as TOUCHES
     EVENTS = 8  # its events, as EVENTS, also where there are none; a tare forgets fingers
-    # touches after each drive, as DRIVE_TOUCHES; of frames only trusted ones are solved
-    DRIVE_TOUCHES = 16
+    DRIVE_TOUCHES = 16  # touches after each drive, as DRIVE_TOUCHES
 
 
 @dataclass(frozen=True)
@@ -304,6 +304,7 @@ class TouchPacket(Payload, c="eits_packet_touch"):
     long_x_mm: F32  # half of the long axis as a vector; 0, 0: a disc, or not known
     long_y_mm: F32
     radius_sd_mm: F32  # standard deviation of the radius; 0: the data do not tell the radius
+    confirmed: U32  # 1: a whole frame has shown it
 
 
 @dataclass(frozen=True)
@@ -325,13 +326,17 @@ class DriveTouchesHead(Payload, c="eits_packet_drive_touches"):
 class DriveTouch(Payload, c="eits_packet_drive_touch"):
     """A touch, as eits_fast_touch."""
 
-    id: U16  # from 1, apart from those of TOUCHES; stays with a touch
+    id: U16  # from 1, as in TOUCHES; stays with a touch
     confirmed: Flag  # 1: a whole frame has shown it
     x_mm: F32  # of the centre, in the model's coordinates
     y_mm: F32  # of the centre
     vx_mm_per_s: F32  # its velocity
     vy_mm_per_s: F32
     strength_s_per_m_mm2: F32  # S mm^2/m
+    radius_mm: F32  # of the disc that it is taken for
+    x_variance_mm2: F32  # covariance of the centre
+    xy_covariance_mm2: F32
+    y_variance_mm2: F32
 
 
 @dataclass(frozen=True)

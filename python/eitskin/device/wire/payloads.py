@@ -43,6 +43,7 @@ from eitskin.device.wire.packets import (
 
 OLDEST_INFO_BYTES = 168  # of the first firmware of this link version
 OLDEST_TOUCH_BYTES = 52
+OLDEST_DRIVE_TOUCH_BYTES = 24
 
 
 class MalformedPacket(ValueError):
@@ -167,14 +168,10 @@ def parse_image(payload: bytes) -> SolvedImage:
 def parse_touches(payload: bytes) -> SolvedTouches:
     solved, each = unpack(Solved, payload, "TOUCHES", more=True), TouchPacket.LAYOUT
     rest = payload[solved.LAYOUT.size :]
-    if (
-        len(rest) == OLDEST_TOUCH_BYTES * solved.count
-    ):  # of a board that does not tell deviations of radii
-        missing = bytes(each.size - OLDEST_TOUCH_BYTES)
-        rest = b"".join(
-            rest[k : k + OLDEST_TOUCH_BYTES] + missing
-            for k in range(0, len(rest), OLDEST_TOUCH_BYTES)
-        )
+    if solved.count > 0 and len(rest) == OLDEST_TOUCH_BYTES * solved.count:
+        # of a board that does not tell deviations of radii; all its touches are of whole frames
+        confirmed = (1).to_bytes(4, "little")
+        rest = _grown(rest, OLDEST_TOUCH_BYTES, each.size - len(confirmed), confirmed)
     else:
         _check_rest(payload, solved, each.size * solved.count, "TOUCHES")
     found = list(each.struct.iter_unpack(rest))
@@ -183,10 +180,19 @@ def parse_touches(payload: bytes) -> SolvedTouches:
     return SolvedTouches(solved, tuple(map(known_touch, found)))
 
 
+def _grown(parts: bytes, had: int, has: int, end: bytes = b"") -> bytes:
+    """Return ``parts`` of ``had`` bytes, each filled with zeros to ``has``, and with ``end``."""
+    missing = bytes(has - had) + end
+    return b"".join(parts[k : k + had] + missing for k in range(0, len(parts), had))
+
+
 def parse_drive_touches(payload: bytes) -> DriveTouches:
     head, each = unpack(DriveTouchesHead, payload, "DRIVE_TOUCHES", more=True), DriveTouch.LAYOUT
-    _check_rest(payload, head, each.size * head.count, "DRIVE_TOUCHES")
     rest = payload[head.LAYOUT.size :]
+    if head.count > 0 and len(rest) == OLDEST_DRIVE_TOUCH_BYTES * head.count:
+        rest = _grown(rest, OLDEST_DRIVE_TOUCH_BYTES, each.size)
+    else:
+        _check_rest(payload, head, each.size * head.count, "DRIVE_TOUCHES")
     parts = (rest[k : k + each.size] for k in range(0, len(rest), each.size))
     found = tuple(unpack(DriveTouch, part, "DRIVE_TOUCHES") for part in parts)
     return DriveTouches(head, found)

@@ -7,11 +7,10 @@ from dataclasses import replace
 from math import ceil
 
 import numpy as np
-import numpy.typing as npt
 
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
-from eitskin.core.fast import FastCore, FastTouch
+from eitskin.core.fast import AlignedFrame, FastCore, FastTouch
 from eitskin.core.results import Reconstruction
 from eitskin.device.wire.link_table import DriveTouch, RawFlags
 from eitskin.device.wire.packets import BoardInfo, DriveTouches, RawFrame
@@ -29,26 +28,27 @@ class DrivesTwin:
         self._fast, self._board = FastCore(engine), board
         self._drives = _in_order(self._fast, protocol)
         self._reported: dict[int, dict[int, Numbers]] = defaultdict(dict)
-        self._begun: dict[int, int] = {}
         self._next: int | None = None
         self._found: Sequence[Touch] | None = None
+        self._before: Sequence[Touch] = ()
+        self.compares = False  # reports after drives were asked for
         self.same = self.different = 0
 
     def hear(self, packet: DriveTouches) -> None:
         """Keep the touches after a drive; its frame comes later."""
-        head = packet.head
+        head, self.compares = packet.head, True
         self._reported[head.frame][head.drive] = _numbers(packet.touches)
-        self._begun[head.frame] = head.begun
 
     def forget(self) -> None:
         """A frame is missing here: what follows is inconclusive until the board begins again."""
         self._next = None
 
-    def take(self, raw: RawFrame) -> npt.NDArray[np.float32] | None:
-        """The next frame's drives; returns what its solver got, None where it was not solved."""
+    def take(self, raw: RawFrame) -> AlignedFrame | None:
+        """The next frame's drives; returns it as it was aligned, None where it was not, or where
+        frames are missing here."""
         reported = self._reported.pop(raw.frame, {})
-        if self._begun.pop(raw.frame, None) == raw.frame:
-            self._next, self._found = raw.frame, None
+        if raw.flags & RawFlags.BEGUN:
+            self._next, self._found, self._before = raw.frame, None, ()
             try:
                 self._fast.begin()
             except FrameError:
@@ -60,8 +60,9 @@ class DrivesTwin:
         for number, middle_us in self._drives_at(raw.time_us):
             rows = self._fast.rows[number]
             here = self._fast.drive(number, raw.voltage_v[rows], middle_us / 1e6)
-            same = reported.get(number, ()) == _numbers(here)
-            self.same, self.different = self.same + same, self.different + (not same)
+            if self.compares:
+                same = reported.get(number, ()) == _numbers(here)
+                self.same, self.different = self.same + same, self.different + (not same)
         if not raw.flags & RawFlags.ALIGNED:
             return None
         if self._found is not None:
@@ -69,13 +70,20 @@ class DrivesTwin:
         self._found = None
         aligned = self._fast.aligned(raw.voltage_v)
         self.different += aligned.trusted != bool(raw.flags & RawFlags.TRUSTED)
-        return np.asarray(aligned.volts) if aligned.trusted else None
+        return aligned
 
     def found(self, result: Reconstruction) -> Reconstruction:
         """Keep the touches that the solver found in the last frame, which the drives of the next
-        one take into account; return the result with the diagnostics that are reported."""
-        self._found = result.touches
-        return replace(result, info=self._fast.named(result.info))
+        one take into account; return the result with the touches and the diagnostics that are
+        reported."""
+        found = tuple(touch for touch in result.touches if touch.explained > 0)
+        touches = self._fast.report(found, self._before)
+        self._found = self._before = found
+        return replace(result, touches=touches, info=self._fast.named(result.info))
+
+    def followed(self) -> tuple[Touch, ...]:
+        """The touches of the last frame where it was not solved."""
+        return self._fast.report((), ())
 
     def _drives_at(self, time_us: int) -> list[tuple[int, int]]:
         """Drives of a scan that began at ``time_us``, and their middles by the board's clock."""
@@ -99,6 +107,8 @@ def _numbers(touches: Sequence[DriveTouch] | Sequence[FastTouch]) -> Numbers:
     """Each touch's numbers as they are on the wire."""
     return tuple(
         np.array([touch.id & 0xFFFF, touch.confirmed, touch.x_mm, touch.y_mm, touch.vx_mm_per_s,
-                  touch.vy_mm_per_s, touch.strength_s_per_m_mm2], dtype="<f4").tobytes()
+                  touch.vy_mm_per_s, touch.strength_s_per_m_mm2, touch.radius_mm,
+                  touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2],
+                 dtype="<f4").tobytes()
         for touch in touches
     )  # fmt: skip

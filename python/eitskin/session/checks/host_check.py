@@ -11,13 +11,14 @@ import numpy.typing as npt
 
 from eitskin.arrays import AnyArray
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
+from eitskin.core.fast import AlignedFrame
 from eitskin.core.gestures import Gestures, event_numbers
 from eitskin.core.results import Info, Options, Reconstruction
 from eitskin.device.client import Device
 from eitskin.device.known_model import KnownModel, board_options, need_model
 from eitskin.device.recordings.recording import FileTransport, recorded_kinds, recorded_options
 from eitskin.device.transport import LinkEvent
-from eitskin.device.wire.link_table import Quality
+from eitskin.device.wire.link_table import Quality, RawFlags
 from eitskin.device.wire.packets import BoardInfo, DriveTouches, RawFrame, Solved
 from eitskin.errors import FrameError
 from eitskin.session.assemble import read_frames
@@ -112,11 +113,15 @@ class HostTwin:
 
     def hear(self, packet: DriveTouches) -> None:
         """Touches after a drive; their frame comes later."""
+        twin = self._drives_twin()
+        if twin is not None:
+            twin.hear(packet)
+
+    def _drives_twin(self) -> DrivesTwin | None:
         engine = self._core.c_engine
         if self._drives is None and self._board is not None and engine is not None:
             self._drives = DrivesTwin(engine, self._protocol, self._board)
-        if self._drives is not None:
-            self._drives.hear(packet)
+        return self._drives
 
     def take(self, frame: Frame) -> Reconstruction | None:
         """The next frame; returns what this host makes of it, None where the board solved
@@ -127,21 +132,25 @@ class HostTwin:
         if self._untouched:
             self._tare()
         self._lost = False
-        aligned = self._drive(frame.raw)
+        tracked = frame.raw is not None and bool(frame.raw.flags & RawFlags.ALIGNED)
+        aligned = self._drive(frame.raw) if tracked else None
         if frame.info is None:
             return None
         if frame.raw is None:
             self.check.alone += 1
             self._sure = False
             return None
-        if not self._tared:
+        if not self._tared or (tracked and aligned is None):
             self.check.inconclusive += 1
             return None
-        return self._compare(frame, frame.raw, aligned)
+        if aligned is not None and not aligned.trusted:
+            self._compare_followed(frame)
+            return None
+        return self._compare(frame, frame.raw, None if aligned is None else aligned.volts)
 
-    def _drive(self, raw: RawFrame | None) -> npt.NDArray[np.float32] | None:
-        """The drives of a frame; it as its solver got it, None where that is as it is."""
-        twin = self._drives
+    def _drive(self, raw: RawFrame | None) -> AlignedFrame | None:
+        """The drives of a frame that the board aligned; None where some are missing here."""
+        twin = self._drives_twin()
         if twin is None or raw is None or not self._tared:
             return None
         aligned = twin.take(raw)
@@ -165,8 +174,14 @@ class HostTwin:
         self._gestures.reset()
         self._tared = self._sure = self._events_known = True
 
+    def _compare_followed(self, frame: Frame) -> None:
+        """A frame that was not solved has the touches that drives follow."""
+        assert self._drives is not None
+        touched = not frame.has_touches or same_touches(self._drives.followed(), frame.touches)
+        self._count(frame, self._same_events(frame) and touched, 1.0, self._tracks)
+
     def _compare(
-        self, frame: Frame, raw: RawFrame, aligned: npt.NDArray[np.float32] | None
+        self, frame: Frame, raw: RawFrame, aligned: AnyArray | None
     ) -> Reconstruction | None:
         aligned_here = self._drives is not None and aligned is not None
         volts = raw.voltage_v if aligned is None else aligned

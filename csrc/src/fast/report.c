@@ -1,0 +1,87 @@
+/* A frame's touches: those that drives follow, with what the whole-frame solver finds of them. */
+#include "fast/fast.h"
+
+enum { NONE = EITS_MAX_TOUCHES };
+
+/* The nearest of `found` within EITS_FAST_CONFIRM_MM that is not taken; NONE if there is none. */
+static uint32_t nearest_of(const eits_touch *found, uint32_t count, const uint8_t *taken,
+                           eits_real x_mm, eits_real y_mm)
+{
+    uint32_t best = NONE;
+    eits_real least = fast_square(EITS_FAST_CONFIRM_MM);
+    for (uint32_t n = 0; n < count; ++n) {
+        const eits_real square =
+            fast_square(found[n].x_mm - x_mm) + fast_square(found[n].y_mm - y_mm);
+        if (!taken[n] && square < least) {
+            least = square;
+            best = n;
+        }
+    }
+    return best;
+}
+
+/* What is known of a touch that the solver has not found in this frame. */
+static eits_touch alone(const eits_fast_touch *t)
+{
+    return (eits_touch){.id = t->id,
+                        .x_mm = t->x_mm,
+                        .y_mm = t->y_mm,
+                        .radius_mm = t->radius_mm,
+                        .strength_s_per_m_mm2 = t->strength_s_per_m_mm2,
+                        .x_variance_mm2 = t->x_variance_mm2,
+                        .xy_covariance_mm2 = t->xy_covariance_mm2,
+                        .y_variance_mm2 = t->y_variance_mm2,
+                        .confirmed = t->confirmed};
+}
+
+/* Sort by strength, the strongest first; touches of equal strength keep their order. */
+static void sort(eits_touch *touches, uint32_t count)
+{
+    for (uint32_t k = 1; k < count; ++k) {
+        const eits_touch moved = touches[k];
+        uint32_t at = k;
+        for (; at > 0 && eits_fabs(touches[at - 1].strength_s_per_m_mm2) <
+                             eits_fabs(moved.strength_s_per_m_mm2);
+             --at)
+            touches[at] = touches[at - 1];
+        touches[at] = moved;
+    }
+}
+
+eits_status eits_fast_report(const eits_fast_touch *tracked, uint32_t n_tracked,
+                             const eits_touch *found, uint32_t n_found, const eits_touch *before,
+                             uint32_t n_before, eits_touch *touches, uint32_t *count)
+{
+    uint8_t taken[EITS_MAX_TOUCHES] = {0}, free[EITS_MAX_TOUCHES] = {0};
+    if (touches == NULL || count == NULL || n_tracked > EITS_FAST_TOUCHES ||
+        n_found > EITS_MAX_TOUCHES || n_before > EITS_MAX_TOUCHES)
+        return EITS_E_ARGUMENT;
+    *count = 0;
+    for (uint32_t k = 0; k < n_tracked; ++k) {
+        const eits_fast_touch *t = &tracked[k];
+        const uint32_t n = nearest_of(found, n_found, taken, t->x_mm, t->y_mm);
+        touches[*count] = alone(t);
+        if (n != NONE) {
+            taken[n] = 1;
+            touches[*count] = found[n];
+            touches[*count].id = t->id;
+            touches[*count].confirmed = 1;
+        }
+        ++*count;
+    }
+    /* A touch that drives do not follow, such as the seventh, is reported where the frame before
+     * showed it, too: a single frame may show a touch that landed while it was scanned aside. */
+    for (uint32_t n = 0; n < n_found && *count < EITS_MAX_TOUCHES; ++n) {
+        const uint32_t last =
+            taken[n] ? NONE : nearest_of(before, n_before, free, found[n].x_mm, found[n].y_mm);
+        if (last == NONE)
+            continue;
+        free[last] = 1;
+        touches[*count] = found[n];
+        touches[*count].id += EITS_FAST_FRAME_IDS;
+        touches[*count].confirmed = 1;
+        ++*count;
+    }
+    sort(touches, *count);
+    return EITS_OK;
+}
