@@ -43,10 +43,10 @@ static bool due(fw_stream *stream)
 }
 
 static void send_solved(fw_host_link *link, const fw_frame *frame, eits_packet_solved *head,
-                        const eits_touch *touches, uint32_t count, bool image)
+                        const eits_touch *touches, uint32_t count)
 {
     const uint32_t pixels = fw_solve_model(link->solve)->n_pixels;
-    if (image && (link->stream.what & EITS_STREAM_IMAGE) != 0) {
+    if ((link->stream.what & EITS_STREAM_IMAGE) != 0) {
         head->count = (uint16_t)pixels;
         head->age_us = fw_now_us(link->board) - frame->end_us;
         (void)fw_tx_queue_send(&link->tx_queue, EITS_PACKET_IMAGE, head, sizeof *head,
@@ -116,17 +116,18 @@ static uint32_t solve(fw_host_link *link, const fw_frame *frame, const float *vo
     fw_stats_add(&link->stats, EITS_STAGE_SOLVE, solve_us);
     if (touches)
         fw_stats_add(&link->stats, EITS_STAGE_TOUCHES, touch_us);
-    send_solved(link, frame, &solved.head, solved.touches, solved.count, true);
+    send_solved(link, frame, &solved.head, solved.touches, solved.count);
     send_events(link, frame, solved.status, solved.touches, solved.count);
     return solve_us + touch_us;
 }
 
-/* A frame that must not be solved has the touches that drives follow, and no image. */
+/* A frame that must not be solved has the touches that drives follow, and the solver's image of the
+ * frame before. */
 static void follow(fw_host_link *link, const fw_frame *frame)
 {
     fw_solved solved;
     fw_frame_follow(link->solve, frame, &solved);
-    send_solved(link, frame, &solved.head, solved.touches, solved.count, false);
+    send_solved(link, frame, &solved.head, solved.touches, solved.count);
     send_events(link, frame, solved.status, solved.touches, solved.count);
 }
 

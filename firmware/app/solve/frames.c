@@ -9,6 +9,8 @@
 #include "app/solve/tare.h"
 #include "app/solve/tracker.h"
 
+#include <math.h>
+
 /* A touch that moves during one scan makes reciprocal rows disagree, too: hence several frames. */
 static void report_reciprocity(fw_solve *solve, const fw_quality *quality)
 {
@@ -123,7 +125,11 @@ void fw_frame_solve(fw_solve *solve, const fw_frame *frame, const float *volts,
 void fw_frame_follow(fw_solve *solve, const fw_frame *frame, fw_solved *out)
 {
     out->count = fw_tracker_report(solve, out->touches);
+    uint32_t masked = 0;
+    for (uint32_t i = 0; i < solve->engine.model.n_rows; ++i)
+        masked += isfinite(frame->volts[i]) ? 0 : 1;
     const eits_info info = {.touches = out->count,
+                            .masked = masked,
                             .shown = out->count > 0 ? EITS_SHOWN_TOUCHES : EITS_SHOWN_SOLVER};
     out->status = EITS_OK;
     out->head = head_of(frame, &info, EITS_OK);

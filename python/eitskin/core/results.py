@@ -1,7 +1,7 @@
 """The inputs and results of a reconstruction, for every engine."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, get_type_hints
@@ -172,7 +172,7 @@ def known_touch(values: Sequence[Any]) -> Touch:
         whole[-3:-1] = [None, None]
     if not whole[-1]:  # the data do not tell the radius
         whole[-1] = None
-    return Touch(*whole, bool(confirmed))
+    return replace(Touch(*whole), confirmed=bool(confirmed))
 
 
 def solve_text(iterations: int, stop: str, gap_rel: float, macs: int, time_us: float) -> str:

@@ -243,7 +243,7 @@ class Frame:
             found=self.found,
             refused=self.refused,
             events=[event.as_dict() | {"time_s": self.time_s} for event in self.events],
-            info=None if self.info is None else self.info.as_dict(),
+            info=None if self.info is None or self.info.unsolved else self.info.as_dict(),
         )
         message["board_us"], message["source"] = self.board_us, self.source
         if arrays:

@@ -44,7 +44,8 @@ class Novelty:
         """Return the lines for what is new in ``message``. In a frame, these are the diagnostics
         that the frames before it did not have, and those that have gone."""
         if isinstance(message, Frame):
-            return [] if message.info is None else self._found(message.info)
+            info = message.info
+            return [] if info is None or info.unsolved else self._found(info)
         if isinstance(message, DriveReport):
             return []
         fault = message.cause if isinstance(message.cause, Fault) else None

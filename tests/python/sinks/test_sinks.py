@@ -125,11 +125,12 @@ def test_osc(swipe, osc):
         assert (path, number, count) == ("/table/frame", frame.number, len(frame.touches))
         assert time_s == pytest.approx(frame.time_s, abs=1e-5)
         for touch in frame.touches:
-            path, one, x, y, _, _, force, confidence = heard.get(timeout=WAIT_S)
-            assert (path, one, force) == ("/table/touch", touch.id, None)
-            assert (x, y, confidence) == pytest.approx(
-                (touch.x_mm, touch.y_mm, touch.confidence), rel=1e-6
-            )
+            path, one, x, y, _, _, force, confidence, sure, *covariance = heard.get(timeout=WAIT_S)
+            assert (path, one, force, sure) == ("/table/touch", touch.id, None, touch.confirmed)
+            assert (x, y) == pytest.approx((touch.x_mm, touch.y_mm), rel=1e-6)
+            assert confidence == (touch.confidence and pytest.approx(touch.confidence, rel=1e-6))
+            known = (touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2)
+            assert covariance == pytest.approx(known, rel=1e-6)
         for event in frame.events:
             path, kind, x, y, _, _, zone, one = heard.get(timeout=WAIT_S)
             assert (path, kind, zone, one) == ("/table/event", event.name, None, event.first_id)
@@ -339,11 +340,13 @@ def test_lsl(swipe):
             outputs.put(frame)
         for touches in swipe.touches:
             sample, _ = inlet.pull_sample(timeout=WAIT_S)
-            assert sample[0] == len(touches) and len(sample) == 1 + 2 * 6
+            assert sample[0] == len(touches) and len(sample) == 1 + 2 * 10
             for k, touch in enumerate(touches):
-                one = sample[1 + 6 * k : 7 + 6 * k]
+                one = sample[1 + 10 * k : 11 + 10 * k]
                 assert one[:3] == pytest.approx((touch.id, touch.x_mm, touch.y_mm), rel=1e-6)
                 assert np.isnan(one[5])
+                assert one[6] == touch.confirmed
+                assert one[7] == pytest.approx(touch.x_variance_mm2, rel=1e-6)
         inlet.close_stream()
 
 
@@ -354,7 +357,7 @@ def test_lsl_of_drives(drives):
     with Outputs(["lsl:table?touches=2"], drives.source) as outputs:
         outputs.put(drives.reports[0])
         (info,) = pylsl.resolve_byprop("name", "table-drives", timeout=WAIT_S)
-        assert (info.nominal_srate(), info.channel_count()) == (0, 2 + 2 * 7)
+        assert (info.nominal_srate(), info.channel_count()) == (0, 2 + 2 * 10)
         inlet = pylsl.StreamInlet(info)
         inlet.open_stream(timeout=WAIT_S)
         for report in drives.reports[1:]:
@@ -364,7 +367,9 @@ def test_lsl_of_drives(drives):
             sample, _ = inlet.pull_sample(timeout=WAIT_S)
             speed = [touch.vx_mm_per_s, touch.vy_mm_per_s, touch.strength_s_per_m_mm2]
             place = [touch.id, touch.confirmed, touch.x_mm, touch.y_mm]
-            assert sample[:9] == [report.time_s, 1, *place, *speed] and np.isnan(sample[9:]).all()
+            sure = [touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2]
+            assert sample[:12] == [report.time_s, 1, *place, *speed, *sure]
+            assert np.isnan(sample[12:]).all()
         inlet.close_stream()
 
 
@@ -416,8 +421,11 @@ def test_mcap(swipe, drives, tmp_path):
         (one.frame, one.drive, one.time_s) for one in drives.reports
     ]
     for message, report in zip(came["/reports"], drives.reports, strict=True):
-        names = [field.name for field in fields(DriveTouch)]
-        seen = [tuple(getattr(touch, name) for name in names) for touch in message.touches]
+        names = [field.name for field in fields(DriveTouch)][:-3]  # then the covariance
+        seen = [
+            (*(getattr(touch, name) for name in names), *touch.covariance_mm2)
+            for touch in message.touches
+        ]
         assert seen == [astuple(touch) for touch in report.touches]
 
 

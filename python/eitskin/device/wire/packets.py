@@ -155,6 +155,11 @@ class Solved(SolvedPacket):
     """The report of the board's core on a frame and its solve, and the times. ``status`` is 0 or an
     eits_status (negative), ``stop`` one of ``STOPS``."""
 
+    @property
+    def unsolved(self) -> bool:
+        """The frame was not solved: its touches are those that drives follow."""
+        return self.status == 0 and self.stop == "iterations" and self.iterations == 0
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON: the same names, without the underscore of ``lambda_``; diagnostics by name."""
         values = {key.rstrip("_"): value for key, value in asdict(self).items()}
