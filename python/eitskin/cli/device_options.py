@@ -154,13 +154,18 @@ def add_every(parser: argparse.ArgumentParser) -> None:
 
 
 def add_report(parser: argparse.ArgumentParser) -> None:
-    """Add ``--report``, which chooses when touches are reported."""
+    """Add ``--report`` and ``--confirmed``, which choose when touches are reported."""
     option(
         parser,
         "--report WHEN",
         "report touches after each frame, or also after each drive of a scan, with their velocity",
         choices=("frame", "drive"),
         default="frame",
+    )
+    parser.add_argument(
+        "--confirmed",
+        action="store_true",
+        help="show only touches that a whole frame has confirmed: 25 to 60 ms after contact",
     )
 
 
@@ -297,6 +302,7 @@ def session_settings(
     return SessionSettings(
         mode=mode,
         report=options.report,
+        confirmed=options.confirmed,
         every=every,
         frames=options.frames or 0,
         model=options.model,

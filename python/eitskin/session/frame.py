@@ -1,7 +1,7 @@
 """The messages that a session gives to every consumer: a ``Frame``, a ``DriveReport`` between
 frames, and a ``Notice`` of something else, such as a fault or an event of the link."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
@@ -39,6 +39,9 @@ class Notice:
     cause: Fault | LinkEvent | None = field(default=None, repr=False)
     source: str | None = None
 
+    def confirmed(self) -> "Notice":
+        return self
+
     def message(self) -> dict[str, Any]:
         facts = asdict(self)
         del facts["cause"]
@@ -62,6 +65,11 @@ class DriveReport:
     time_unix_s: float | None = None
     source: str | None = None
 
+    def confirmed(self) -> "DriveReport":
+        """The same with the touches alone that a whole frame has confirmed."""
+        touches = tuple(touch for touch in self.touches if touch.confirmed)
+        return replace(self, packet=replace(self.packet, touches=touches))
+
     @property
     def time_s(self) -> float:
         """The instant, by the clock of frames' ``time_s``."""
@@ -79,7 +87,7 @@ class DriveReport:
 
     @property
     def touches(self) -> tuple[DriveTouch, ...]:
-        """In the order in which they came: mm, mm/s; their ids are not those of frames."""
+        """In the order in which they came: mm, mm/s; their ids are those of frames."""
         return self.packet.touches
 
     def message(self) -> dict[str, Any]:
@@ -141,6 +149,10 @@ class Frame:
     errors_mm: dict[int, float] | None = None
     notices: tuple[Notice, ...] = ()
     source: str | None = None
+
+    def confirmed(self) -> "Frame":
+        """The same with the touches alone that a whole frame has confirmed."""
+        return replace(self, touches=tuple(touch for touch in self.touches if touch.confirmed))
 
     @property
     def time_s(self) -> float:

@@ -330,7 +330,7 @@ class Session:
                 self._count += 1
             if self.timed and not isinstance(message, Notice):
                 self.pacer.hold(message.time_us)
-            yield message
+            yield message.confirmed() if self.settings.confirmed else message
 
     def _begin_again(self) -> bool:
         """Open a looped recording once more; False where nothing comes any more."""

@@ -37,6 +37,7 @@ class SessionSettings:
         mode: what is streamed; None: all that a simulated or recorded board can send, and image
             and touches of a real one, whose line carries fewer frames with raw voltages.
         report: "frame", or also touches after each "drive", with their velocity.
+        confirmed: only touches that a whole frame has confirmed, in frames and reports.
         every: every n-th frame; 0: as many as the line carries.
         frames: stop after so many; 0: go on until the scene or the recording ends.
         model: a file, where the board's model is not the prebuilt one.
@@ -53,6 +54,7 @@ class SessionSettings:
 
     mode: Stream | None = Stream.TOUCHES
     report: str = "frame"
+    confirmed: bool = False
     every: int = 0
     frames: int = 0
     model: Path | None = None
