@@ -138,7 +138,8 @@ void fuzz_check_touches(const eits_context *ctx, const eits_touch *touches, uint
         const eits_touch *t = touches + k;
         fuzz_note("touches", &t->id, sizeof t->id);
         fuzz_note_reals("touches", &t->x_mm,
-                        (sizeof *t - offsetof(eits_touch, x_mm)) / sizeof t->x_mm);
+                        (offsetof(eits_touch, confirmed) - offsetof(eits_touch, x_mm)) /
+                            sizeof t->x_mm);
         MUST(eits_is_finite(t->force_n) && t->force_n >= 0);
         MUST(eits_is_finite(t->x_mm) && eits_is_finite(t->y_mm) &&
              eits_is_finite(t->strength_s_per_m_mm2));
