@@ -374,6 +374,15 @@ static uint32_t fits_from(eits_fast *fast, uint32_t from, const eits_real *first
     return found;
 }
 
+/* Whether two fits are the same touches, in either order. */
+static int are_same(const fast_fit *a, const fast_fit *b)
+{
+    if (a->count == 1)
+        return !fast_apart(a->place[0], b->place[0]);
+    return (!fast_apart(a->place[0], b->place[0]) && !fast_apart(a->place[1], b->place[1])) ||
+           (!fast_apart(a->place[0], b->place[1]) && !fast_apart(a->place[1], b->place[0]));
+}
+
 const fast_fit *eits_fast_find(eits_fast *fast, uint32_t from, const eits_real *first,
                                eits_real *lead)
 {
@@ -386,9 +395,8 @@ const fast_fit *eits_fast_find(eits_fast *fast, uint32_t from, const eits_real *
         keep(fast, from, ranked, found);
     if (found == 0)
         return NULL;
-    const uint32_t own = ranked[0]->count - 1;
     *lead = ranked[0]->score;
-    if (found == 2 && fast_apart(ranked[0]->place[own], ranked[1]->place[own]))
+    if (found == 2 && !are_same(ranked[0], ranked[1]))
         *lead -= ranked[1]->score > 0 ? ranked[1]->score : 0;
     return ranked[0];
 }

@@ -163,6 +163,15 @@ static int near_known(const eits_fast *fast, const eits_real *place)
     return 0;
 }
 
+/* The frames that found touch k have seen it in all their drives: the next one has it already. */
+static void was_there(eits_fast *fast, uint32_t k)
+{
+    for (uint32_t n = 0; n < fast->drives; ++n) {
+        fast->drive[n].there[k] = 1;
+        eits_copy(fast->drive[n].then[k], fast->state + (size_t)FAST_SIZE * k, FAST_WAYS);
+    }
+}
+
 /* Touches that two frames on end have found and no drive; `at`: where the modelled skin has them.
  */
 static void seed(eits_fast *fast, const eits_touch *found, const eits_real (*at)[2],
@@ -191,6 +200,7 @@ static void seed(eits_fast *fast, const eits_touch *found, const eits_real (*at)
         const eits_real variance[FAST_SIZE] = {
             place, place, fast_square(EITS_FAST_SEED_STRENGTH * c), speed, speed};
         eits_fast_add(fast, state, variance, 0);
+        was_there(fast, fast->count - 1);
         fast->known[fast->count - 1].energy = 4 * EITS_FAST_FAINT;
         fast->known[fast->count - 1].confirmed = 1;
     }
