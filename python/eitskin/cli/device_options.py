@@ -165,7 +165,8 @@ def add_report(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--confirmed",
         action="store_true",
-        help="show only touches that a whole frame has confirmed: 25 to 60 ms after contact",
+        help="show only touches that a whole frame has confirmed, one to three frames after"
+        " contact",
     )
 
 
