@@ -290,7 +290,8 @@ TEST(masked_while_learning)
         noise[masked] = (double)ctx->reference.noise_v;
         CHECK_EQUAL(eits_reconstruct(ctx, b.frame, SMALL_ROWS, NULL, NULL), EITS_OK);
         CHECK_EQUAL(eits_get_info(ctx)->masked, masked);
-        CHECK(ctx->rows.unusable[4] == masked && (isnan((double)ctx->reference.v0[4]) != 0) == masked);
+        CHECK(ctx->rows.unusable[4] == masked &&
+              (isnan((double)ctx->reference.v0[4]) != 0) == masked);
         CHECK_NEAR(ctx->reference.correlation, 1, 1e-3);
         /* until the next reference */
         CHECK_EQUAL(eits_reference_set(ctx, b.frame, SMALL_ROWS), EITS_OK);
