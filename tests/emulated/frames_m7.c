@@ -201,7 +201,8 @@ static void print_touches(const eits_touch *touches, uint32_t found)
                                t->y_variance_mm2,
                                t->long_x_mm,
                                t->long_y_mm,
-                               t->radius_sd_mm};
+                               t->radius_sd_mm,
+                               (float)t->confirmed};
         printf(" %lu", (unsigned long)t->id);
         for (size_t l = 0; l < sizeof reals / sizeof reals[0]; ++l)
             printf(":%08lx", bits_of(reals[l]));
