@@ -36,7 +36,7 @@ def scene() -> Scene:
         touches=(touch,),
         frames=FRAMES,
         quiet_frames=UNTOUCHED,
-        elements=2500,
+        elements=5000,
         effects={"noise": {"snr_db": 60.0}},
     )
 

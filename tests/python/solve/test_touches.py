@@ -104,7 +104,7 @@ def test_touches_are_where_they_were_put(engine):
         # conductivity, to first order in its size: higher orders add some 10 % at this one
         expected = 2 * 4 / 6 * 0.01 * np.pi * 9.0**2
         assert touches[0].strength_s_per_m_mm2 == pytest.approx(expected, rel=0.15)
-        assert touches[0].explained > 0.9
+        assert touches[0].explained > 0.85
 
 
 def test_touches_come_strongest_first_with_ids_of_their_own():
