@@ -6,7 +6,6 @@ from typing import Any
 
 from eitskin.cli.arguments import option
 from eitskin.errors import UsageError
-from eitskin.skin.skin import load_skin, paper_skin
 
 MADE = Path("hardware/made")
 
@@ -51,6 +50,7 @@ def run_make(options: argparse.Namespace) -> int:
 
 def run_container(options: argparse.Namespace) -> int:
     """Write the container of one skin."""
+    from eitskin.skin.skin import load_skin, paper_skin
     from eitskin_hardware.container.container import PARTS, container_of, make_stl, write_scad
     from eitskin_hardware.container.drawing import draw_measures, draw_wires
 

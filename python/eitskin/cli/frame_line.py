@@ -25,6 +25,8 @@ def _solve_text(frame: Frame) -> str:
     solved = frame.info
     if solved is None:
         return ""
+    if solved.unsolved:
+        return "not solved"
     macs, time_us = solved.macs + solved.touch_macs, solved.solve_us + solved.touch_us
     return solve_text(solved.iterations, solved.stop, solved.gap_rel, macs, time_us)
 

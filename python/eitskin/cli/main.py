@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from typing import NoReturn
 
 from eitskin import __version__
@@ -98,7 +99,9 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
             importlib.import_module(f"eitskin.cli.cmd_{name}").add_options(command)
     if only not in COMMANDS:
         for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda one: one.name):
-            entry.load().add_parser(subparsers)
+            # moved or deleted sources leave their entry point
+            if find_spec(entry.module.partition(".")[0]) is not None:
+                entry.load().add_parser(subparsers)
     if only in STUDIES and only not in subparsers.choices:
         raise missing_checkout(f"eitskin {only}", "firmware/emulator", "studies")
     return parser

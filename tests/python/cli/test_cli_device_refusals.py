@@ -193,7 +193,7 @@ def test_what_the_board_refuses(refused, scene):
 @pytest.mark.parametrize("missing", ["eitskin_emulator", "unicorn"])
 def test_without_the_emulated_board(missing, scene):
     done = run_python(without(missing) + MAIN, "stream", "--device", f"emu:{scene}")
-    assert done.returncode == EXTRA and "folder run  pip install ./firmware/emulator" in done.stderr
+    assert done.returncode == EXTRA and "folder  pip install ./firmware/emulator" in done.stderr
     assert done.stderr.count("\n") == 1
 
 

@@ -82,7 +82,9 @@ def test_reconstruct_with_a_preset(json_of, frames_file, ran):
     most = max(frame["info"]["iterations"] for frame in fine["frames"])
     solves = 2 if point.configuration.second_pass else 1
     assert most == solves * fine["settings"]["iterations"] != 60
-    assert fine["summary"]["miou_image"] >= usual["summary"]["miou_image"]
+    # a preset chooses the solver's settings; the image drawn of touches hardly depends on them
+    assert fine["summary"]["miou_solver"] > usual["summary"]["miou_solver"]
+    assert fine["summary"]["miou_image"] > usual["summary"]["miou_image"] - 0.01
     for info in (frame["info"] for frame in fine["frames"] + usual["frames"]):
         assert info["solve_us"] > 0 and info["touch_us"] >= 0
     quick = json.loads(ran(0, f"reconstruct {frames_file} --preset fast --json")[0])
@@ -114,10 +116,14 @@ def test_a_model_that_nothing_was_measured_with(refused, done, frames_file, tmp_
     )
 
 
-def test_boards_receive_the_settings(scene, ran):
+def test_boards_receive_the_settings(tmp_path, ran):
+    scene = write_scene(tmp_path / "one.toml", elements=900)
     out, err = ran(0, f"stream --device sim:{scene} --preset balanced --json")
     assert "on the F767 (an estimate)" in err and "at most 60 iterations" in err
-    for info in (json.loads(line)["info"] for line in out.splitlines()[:2]):
+    infos = [json.loads(line)["info"] for line in out.splitlines()[:-1]]
+    solved = [info for info in infos if info is not None]
+    assert len(infos) == 6 and len(solved) >= 4  # not the first one, in which the touch lands
+    for info in solved:
         assert info["stop"] == "iterations" and info["iterations"] == 60
     line = ran(0, f"stream --device sim:{scene} --preset fast -v")[0].splitlines()[0]
     assert "iterations (limit), gap" in line and "MMAC" in line

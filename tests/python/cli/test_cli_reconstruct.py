@@ -23,7 +23,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 TOUCH = {
     "id", "x_mm", "y_mm", "radius_mm", "strength_s_per_m_mm2", "explained", "force_n", "confidence",
     "x_variance_mm2", "xy_covariance_mm2", "y_variance_mm2", "long_x_mm", "long_y_mm",
-    "radius_sd_mm",
+    "radius_sd_mm", "confirmed",
 }  # fmt: skip
 INFO = {
     "iterations", "stop", "nonzeros", "masked", "step_halvings", "touches", "macs", "touch_macs",
