@@ -26,6 +26,7 @@ from eitskin.session.summary import Summary
 
 TARE_FRAMES = 8
 FRAMES = 3
+TRACKED_FRAMES = 6  # the first are not solved: touches land during their scans
 EVERYTHING = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 
@@ -68,12 +69,13 @@ def run_board_demo(url: str) -> BoardDemo:
         if began_us is not None:
             truth.began_us = began_us
         every = carried_every(device, EVERYTHING)
-        for message in read_frames(device, EVERYTHING, every=every, frames=FRAMES):
+        frames = FRAMES if every > 1 else TRACKED_FRAMES
+        for message in read_frames(device, EVERYTHING, every=every, frames=frames):
             if isinstance(message, Frame):
                 summary.add(message)
         log.stop()
         info = device.board
-    twin, last = HostTwin(known, options), None
+    twin, last = HostTwin(known, options, info), None
     for message in log.frames(EVERYTHING):
         if isinstance(message, Frame):
             result = twin.take(message)

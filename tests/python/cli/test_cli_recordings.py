@@ -28,6 +28,7 @@ FRAMES = 6
 SOLVED_HEAD = 68
 RAW_HEAD = 16
 
+ALONE = "--mode raw,image"  # nothing of the frames before is in these
 QUIETLY = ("--ignore", "crowded")  # a press that fades, solved coarsely, may be called so
 
 
@@ -162,24 +163,26 @@ def lost(run: Path, target: Path, number: int = 16 + 1) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("how", "same"), [("--warm", 1), ("", None), ("--no-track", FRAMES - 1)],
+    ("how", "same"), [("--warm", 1), ("", 1), (ALONE, FRAMES - 1)],
     ids=["warm", "tracked", "each by itself"],
 )  # fmt: skip
 def test_frames_after_a_loss_are_not_called_different(how, same, done, json_of, scene, tmp_path):
-    """A warm solve begins from the last one, and touches that are followed in time began from the
-    frame that is lost: the host's have other bits and nobody's fault it is. Without tracking, every
-    frame can be judged."""
+    """A warm solve begins from the last one, and touches that are tracked through scans need the
+    drives of the frame that is lost: the host's have other bits and nobody's fault it is. Without
+    touches, every frame can be judged."""
     run = tmp_path / "run.eits"
     done(f"record --device sim:{scene} -o {run}", how)
     facts = json_of(f"replay {lost(run, tmp_path / 'other.eits')} --check")
     assert facts["different"] == [] and facts["alone"] == 1
     assert facts["same"] + facts["inconclusive"] == FRAMES - 1
-    assert same in (None, facts["same"]) and (facts["inconclusive"] > 0) == (how != "--no-track")
+    assert same in (None, facts["same"]) and (facts["inconclusive"] > 0) == (how != ALONE)
 
 
-def test_an_image_after_a_loss_is_judged_all_the_same(run, tmp_path, ran):
-    """Tracking changes touches only: an image that differs is reported, whatever was lost
-    before."""
+def test_an_image_after_a_loss_is_judged_all_the_same(done, scene, tmp_path, ran):
+    """Without touches, each image is of its frame alone: one that differs is reported, whatever was
+    lost before."""
+    run = tmp_path / "run.eits"
+    done(f"record --device sim:{scene} -o {run}", ALONE)
     image = nth(PacketType.IMAGE, 3, flipped(SOLVED_HEAD + 4 * 400))
     other = changed(lost(run, tmp_path / "lost.eits"), tmp_path / "other.eits", image)
     assert len(json.loads(ran(10, f"replay {other} --check --json")[0])["different"]) == 1

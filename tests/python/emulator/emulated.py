@@ -91,7 +91,8 @@ def twin_check(
         taken.append(item)
     device.start_scene()
     model = decode_model(blob, "the model")
-    twin = HostTwin(KnownModel(model, blob), board_options(model, device.board))
+    board = device.board
+    twin = HostTwin(KnownModel(model, blob), board_options(model, board), board)
     for item in taken:
         if isinstance(item, RawFrame) and item.untouched:
             twin.take(Frame(item.frame, 0, item.time_us, raw=item))

@@ -3,7 +3,6 @@ the host's to the bit."""
 
 import zlib
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -11,9 +10,8 @@ import numpy as np
 import pytest
 from qemu_board import Run, Script, run_board, skin_bytes
 
-from eitskin.core.engine import CoreEngine
 from eitskin.device.bank import bank_bytes
-from eitskin.device.known_model import board_options
+from eitskin.device.known_model import KnownModel, board_options
 from eitskin.device.wire.link_table import (
     FaultCode,
     GetInfo,
@@ -22,6 +20,7 @@ from eitskin.device.wire.link_table import (
     ModelCommit,
     ModelData,
     Quality,
+    Scan,
     Stream,
     StreamCommand,
     Tare,
@@ -36,10 +35,15 @@ from eitskin.device.wire.packets import (
     SolvedTouches,
 )
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.session.assemble import assembled
+from eitskin.session.checks.host_check import HostTwin
+from eitskin.session.frame import Frame
 
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
-FRAME_US = 120_000
-TARED_BY_US = 500_000
+PERIOD_US = 80_000  # of frames: each is solved before the next, by QEMU's slow processor, too
+FRAME_US = 3 * PERIOD_US
+TARED_BY_US = 900_000
+END_US = 1_700_000
 LSB_V = 3.3 / 4096 / 1.5  # at the electrodes
 Kind = TypeVar("Kind")
 
@@ -69,15 +73,16 @@ def files() -> dict[str, bytes]:
     model, blob = load_prebuilt()
     script = Script()
     script.at(100_000, GetInfo())
+    script.at(105_000, Scan(50_000_000, 1_000_000, 80, 16, 1, 0, PERIOD_US))
     script.at(110_000, StreamCommand(int(Stream.RAW)))
     script.at(120_000, Tare(8))
     script.at(TARED_BY_US, StreamCommand(int(ALL)))
-    script.at(990_000, GetStats())
+    script.at(END_US - 10_000, GetStats())
     skin = skin_bytes(model.protocol.drive_measure, volts(), FRAME_US)
     return {
         "bank0.bin": bank_bytes(blob, 1),
         "skin.bin": skin,
-        "link_in.bin": script.to_bytes(1_000_000),
+        "link_in.bin": script.to_bytes(END_US),
     }
 
 
@@ -88,7 +93,7 @@ def run(image, files, tmp_path_factory) -> Run:
 
 def test_every_packet_arrives_and_every_command_succeeds(run):
     assert vars(run.counters) | {"bytes": 0, "packets": 0} == dict.fromkeys(vars(run.counters), 0)
-    assert [reply.request for reply in of(Reply, run.packets) if reply.ok] == [2, 3, 4]
+    assert [reply.request for reply in of(Reply, run.packets) if reply.ok] == [2, 3, 4, 5]
     assert of(Fault, run.packets) == []
 
 
@@ -103,7 +108,8 @@ def test_the_scan_keeps_its_time(run):
         " frames solved"
     )
     assert max(scans) <= 208 * info.slot_us
-    assert stats.stack_used < 18 * 1024  # the F767 has 24 KB
+    # the joint fit of touches takes most of it: 20124 bytes; the F767 has 24 KB but for a guard
+    assert stats.stack_used < 20 * 1024
 
 
 def test_the_voltages_are_the_skins(run):
@@ -117,31 +123,24 @@ def test_the_voltages_are_the_skins(run):
 
 
 def test_the_same_bits_as_the_host(run):
+    """Images, and touches tracked through scans."""
     model, blob = load_prebuilt()
-    host = CoreEngine(blob)
-    host.set_options(board_options(model, of(BoardInfo, run.packets)[-1]))
-    raws = of(RawFrame, run.packets)
-    host.set_reference(np.array([raw.voltage_v for raw in raws if raw.untouched], dtype=np.float64))
-    images = {one.solved.frame: one for one in of(SolvedImage, run.packets)}
-    touches = {one.solved.frame: one for one in of(SolvedTouches, run.packets)}
-    assert len(images) >= 8 and images.keys() == touches.keys()
-    last_untouched = max(raw.frame for raw in raws if raw.untouched)
-    found = 0
-    for raw in raws:
-        if raw.frame <= last_untouched:
+    info = of(BoardInfo, run.packets)[-1]
+    parts = [one for one in run.packets if isinstance(one, RawFrame | SolvedImage | SolvedTouches)]
+    twin = HostTwin(KnownModel(model, blob), board_options(model, info), info)
+    solved = found = 0
+    for frame in assembled(parts, ALL):
+        assert isinstance(frame, Frame)
+        host = twin.take(frame)
+        if host is None:
             continue
-        expected = host.reconstruct(raw.voltage_v)
-        if raw.frame not in images:
-            continue
-        board = images.pop(raw.frame)
-        assert board.image.tobytes() == expected.solver_image.tobytes(), f"frame {raw.frame}"
-        reported = board.solved.stop, board.solved.iterations
-        assert reported == (expected.info.stop, expected.info.iterations)
-        assert [replace(touch, id=0) for touch in touches[raw.frame].touches] == [
-            replace(touch, id=0) for touch in expected.touches
-        ]
-        found += len(expected.touches)
-    assert not images, "images of frames whose voltages were not sent"
+        assert frame.info is not None
+        reported = frame.info.stop, frame.info.iterations
+        assert reported == (host.info.stop, host.info.iterations)
+        solved, found = solved + 1, found + len(host.touches)
+    check = twin.check
+    assert (check.different, check.inconclusive, check.alone) == ([], 0, 0)
+    assert check.same == check.images == check.touches >= solved >= 6
     assert found >= 4
 
 
