@@ -47,7 +47,7 @@ sign = "reversed"
 
 def volts() -> np.ndarray:
     """Untouched frames, then touched ones, (18, 208), in our order."""
-    rows = frames().rows(adjacent(16))
+    rows = frames(5000).rows(adjacent(16))
     kept = [rows.around(k) for k in range(18)]
     return np.array([v[k - first] for k, (first, v) in enumerate(kept)])
 
