@@ -109,6 +109,7 @@ def test_a_board_that_still_starts_cannot_be_bounded():
         BoundedTime(board, OPTIMISTIC)
 
 
+@pytest.mark.long("tests/c and test_timers.py: switching by instructions, without the bound")
 def test_the_pessimistic_bound_switches_in_time_with_a_margin(image):
     """Half a microsecond of the 4.5 that a slot of 100 us leaves after its last sample, but for one
     slot in a thousand, which is measured again: since touches are tracked in every stream, one of
