@@ -7,8 +7,8 @@
 #include "frame/reference.h"
 #include "frame/whitening.h"
 #include "model/options.h"
-
 #include "multipole/multipole.h"
+
 #include <string.h>
 
 _Static_assert(sizeof(eits_context) <= EITS_CONTEXT_SIZE, "EITS_CONTEXT_SIZE is too small");

@@ -197,6 +197,13 @@ void eits_fast_add(eits_fast *fast, const eits_real *state, const eits_real *var
                    eits_real xy);
 void eits_fast_forget(eits_fast *fast, uint32_t k);
 
+/* ---- frames.c ---- */
+
+/* The nearest to `place`, mm, of those found that no touch has taken, within EITS_FAST_CONFIRM_MM;
+ * `count` where there is none. */
+uint32_t eits_fast_nearest(const eits_real *place, const eits_real (*found)[2],
+                           const uint8_t *taken, uint32_t count);
+
 /* ---- map.c ---- */
 
 /* A drive enters the map of what a touch at each cell would explain. */

@@ -118,10 +118,8 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     return EITS_OK;
 }
 
-/* The nearest of those found that no touch has taken, within EITS_FAST_CONFIRM_MM; `count` where
- * there is none. */
-static uint32_t nearest(const eits_real *place, const eits_real (*found)[2], const uint8_t *taken,
-                        uint32_t count)
+uint32_t eits_fast_nearest(const eits_real *place, const eits_real (*found)[2],
+                           const uint8_t *taken, uint32_t count)
 {
     uint32_t best = count;
     eits_real least = fast_square(EITS_FAST_CONFIRM_MM);
@@ -225,7 +223,7 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
         if (!known->aligned) /* it came after that frame */
             continue;
         known->aligned = 0;
-        const uint32_t n = nearest(known->at, (const eits_real(*)[2])at, taken, count);
+        const uint32_t n = eits_fast_nearest(known->at, (const eits_real(*)[2])at, taken, count);
         if (n < count) {
             taken[n] = 1;
             known->confirmed = 1;

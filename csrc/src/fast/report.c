@@ -1,26 +1,16 @@
 /* A frame's touches: those that drives follow, with what the whole-frame solver finds of them. */
 #include "fast/fast.h"
 
-enum { NONE = EITS_MAX_TOUCHES };
-
-/* The nearest of `found` within EITS_FAST_CONFIRM_MM that is not taken; NONE if there is none. */
-static uint32_t nearest_of(const eits_touch *found, uint32_t count, const uint8_t *taken,
-                           eits_real x_mm, eits_real y_mm)
+/* The places of touches, mm. */
+static void places_of(const eits_touch *touches, uint32_t count, eits_real (*at)[2])
 {
-    uint32_t best = NONE;
-    eits_real least = fast_square(EITS_FAST_CONFIRM_MM);
     for (uint32_t n = 0; n < count; ++n) {
-        const eits_real square =
-            fast_square(found[n].x_mm - x_mm) + fast_square(found[n].y_mm - y_mm);
-        if (!taken[n] && square < least) {
-            least = square;
-            best = n;
-        }
+        at[n][0] = touches[n].x_mm;
+        at[n][1] = touches[n].y_mm;
     }
-    return best;
 }
 
-/* What is known of a touch that the solver has not found in this frame. */
+/* A touch that the solver has not found in this frame: what drives know of it. */
 static eits_touch alone(const eits_fast_touch *t)
 {
     return (eits_touch){.id = t->id,
@@ -52,16 +42,20 @@ eits_status eits_fast_report(const eits_fast_touch *tracked, uint32_t n_tracked,
                              const eits_touch *found, uint32_t n_found, const eits_touch *before,
                              uint32_t n_before, eits_touch *touches, uint32_t *count)
 {
-    uint8_t taken[EITS_MAX_TOUCHES] = {0}, free[EITS_MAX_TOUCHES] = {0};
+    uint8_t taken[EITS_MAX_TOUCHES] = {0}, used[EITS_MAX_TOUCHES] = {0};
     if (touches == NULL || count == NULL || n_tracked > EITS_FAST_TOUCHES ||
         n_found > EITS_MAX_TOUCHES || n_before > EITS_MAX_TOUCHES)
         return EITS_E_ARGUMENT;
+    eits_real here[EITS_MAX_TOUCHES][2], there[EITS_MAX_TOUCHES][2];
+    places_of(found, n_found, here);
+    places_of(before, n_before, there);
     *count = 0;
     for (uint32_t k = 0; k < n_tracked; ++k) {
         const eits_fast_touch *t = &tracked[k];
-        const uint32_t n = nearest_of(found, n_found, taken, t->x_mm, t->y_mm);
+        const eits_real place[2] = {t->x_mm, t->y_mm};
+        const uint32_t n = eits_fast_nearest(place, (const eits_real(*)[2])here, taken, n_found);
         touches[*count] = alone(t);
-        if (n != NONE) {
+        if (n < n_found) {
             taken[n] = 1;
             touches[*count] = found[n];
             touches[*count].id = t->id;
@@ -73,10 +67,11 @@ eits_status eits_fast_report(const eits_fast_touch *tracked, uint32_t n_tracked,
      * showed it, too: a single frame may show a touch that landed while it was scanned aside. */
     for (uint32_t n = 0; n < n_found && *count < EITS_MAX_TOUCHES; ++n) {
         const uint32_t last =
-            taken[n] ? NONE : nearest_of(before, n_before, free, found[n].x_mm, found[n].y_mm);
-        if (last == NONE)
+            taken[n] ? n_before
+                     : eits_fast_nearest(here[n], (const eits_real(*)[2])there, used, n_before);
+        if (last == n_before)
             continue;
-        free[last] = 1;
+        used[last] = 1;
         touches[*count] = found[n];
         touches[*count].id += EITS_FAST_FRAME_IDS;
         touches[*count].confirmed = 1;

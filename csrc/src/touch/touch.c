@@ -90,10 +90,24 @@ static void remove_interaction(eits_context *ctx, const eits_scratch *scratch, e
         eits_fit_restart(ctx, scratch, f);
 }
 
-/* First places: to data that strong touches bend less, if there are any.
- *
- * The first places decide what the fit ends at: hence data that strong touches bend less, and a
- * radius that their strength suggests instead of the same one for all. */
+/* Discs at the image's peaks, moved in so many sweeps. They begin with the radius that their
+ * strength suggests instead of the same one for all. */
+static void start_at_peaks(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
+                           uint32_t sweeps)
+{
+    const eits_options *o = &ctx->options;
+    seed(ctx, scratch, f);
+    eits_fit_strengths(ctx, scratch, f);
+    if (o->touch_change_s_per_m > 0) {
+        for (uint32_t k = 0; k < f->count; ++k)
+            f->disc[k].radius_mm = eits_expected_radius(o, &f->disc[k]);
+        eits_fit_strengths(ctx, scratch, f);
+    }
+    eits_fit_move_all(ctx, scratch, f, sweeps);
+}
+
+/* First places. They decide what the fit ends at, so they are fitted to data that strong touches
+ * bend less, if there are any. */
 static void begin(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     const eits_options *o = &ctx->options;
@@ -101,15 +115,19 @@ static void begin(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
     if (o->touch_seek && o->touch_sweeps > 0) {
         eits_fit_seek(ctx, scratch, f);
     } else {
-        seed(ctx, scratch, f);
-        eits_fit_strengths(ctx, scratch, f);
-        if (o->touch_change_s_per_m > 0) {
-            for (uint32_t k = 0; k < f->count; ++k)
-                f->disc[k].radius_mm = eits_expected_radius(o, &f->disc[k]);
-            eits_fit_strengths(ctx, scratch, f);
-        }
-        eits_fit_move_all(ctx, scratch, f, o->touch_sweeps - later(ctx));
+        start_at_peaks(ctx, scratch, f, o->touch_sweeps - later(ctx));
     }
+    eits_fit_prune(ctx, scratch, f);
+}
+
+/* The last stage: to the data less the discs' interaction, with the prior of the radius that it
+ * asks for. */
+static void finish(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
+{
+    f->radius_weight =
+        ctx->options.touch_radius_weight * (eits_has_interaction(ctx) ? EITS_FINAL_RADIUS : 1);
+    remove_interaction(ctx, scratch, f);
+    eits_fit_move_all(ctx, scratch, f, later(ctx));
     eits_fit_prune(ctx, scratch, f);
 }
 
@@ -118,14 +136,7 @@ void eits_fit_peaks(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
     const eits_options *o = &ctx->options;
     f->radius_weight = o->touch_radius_weight;
     f->data = ctx->frame.y;
-    seed(ctx, scratch, f);
-    eits_fit_strengths(ctx, scratch, f);
-    if (o->touch_change_s_per_m > 0) {
-        for (uint32_t k = 0; k < f->count; ++k)
-            f->disc[k].radius_mm = eits_expected_radius(o, &f->disc[k]);
-        eits_fit_strengths(ctx, scratch, f);
-    }
-    eits_fit_move_all(ctx, scratch, f, o->touch_sweeps < 1 ? o->touch_sweeps : 1);
+    start_at_peaks(ctx, scratch, f, o->touch_sweeps < 1 ? o->touch_sweeps : 1);
     eits_fit_prune(ctx, scratch, f);
 }
 
@@ -157,21 +168,14 @@ void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *
         eits_fit_move_all(ctx, scratch, f, later(ctx));
         eits_fit_prune(ctx, scratch, f);
     }
-    f->radius_weight = ctx->options.touch_radius_weight * (interacts ? EITS_FINAL_RADIUS : 1);
-    remove_interaction(ctx, scratch, f);
-    eits_fit_move_all(ctx, scratch, f, later(ctx));
-    eits_fit_prune(ctx, scratch, f);
+    finish(ctx, scratch, f);
 }
 
 void eits_fit_settle(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
-    const int interacts = eits_has_interaction(ctx);
     f->settled = 1;
-    f->radius_weight = ctx->options.touch_radius_weight * (interacts ? EITS_FINAL_RADIUS : 1);
     eits_fit_strengths(ctx, scratch, f);
-    remove_interaction(ctx, scratch, f);
-    eits_fit_move_all(ctx, scratch, f, later(ctx));
-    eits_fit_prune(ctx, scratch, f);
+    finish(ctx, scratch, f);
 }
 
 /* ---- the report ---- */

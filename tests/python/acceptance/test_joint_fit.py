@@ -1,6 +1,7 @@
 """Where touches are found on frames of the exact model of a round skin: the joint fit, and what
 its absence costs."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -8,10 +9,11 @@ import numpy as np
 import pytest
 
 from eitskin.arrays import FloatArray
+from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import ALL_TOUCH_FIT, JOINT
 from eitskin.oracle.round_skin import RoundSkin
 from eitskin.scene.random_touches import TouchRules, TouchScene, random_touches
-from eitskin.scoring.matching import match
+from eitskin.scoring.matching import Matching, match
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt
@@ -55,17 +57,24 @@ def frames(kind: str) -> tuple[Frames, ...]:
     return tuple(made)
 
 
+def found_by(
+    solver: Reconstructor, kind: str
+) -> Iterator[tuple[Frames, Sequence[Touch], Matching]]:
+    """Yield each scene of a kind with the touches found in it, and those matched."""
+    for one in frames(kind):
+        solver.tare(one.untouched_v)
+        solver.forget()
+        found = solver.reconstruct(one.touched_v).touches
+        yield one, found, match(one.scene.centres_mm(), [(t.x_mm, t.y_mm) for t in found])
+
+
 def errors_mm(kind: str, touch_fit: int) -> tuple[FloatArray, int]:
     """The distances of found touches from true ones, and how many scenes have the right count."""
     solver = Reconstructor(prebuilt()[0])
     solver.set_options(touch_fit=touch_fit)
     distances: list[float] = []
     right = 0
-    for one in frames(kind):
-        solver.tare(one.untouched_v)
-        solver.forget()
-        found = solver.reconstruct(one.touched_v).touches
-        matched = match(one.scene.centres_mm(), [(t.x_mm, t.y_mm) for t in found])
+    for _, _, matched in found_by(solver, kind):
         distances += matched.distances_mm
         right += matched.exact
     return np.array(distances), right
@@ -106,11 +115,7 @@ def test_light_and_insulating_touches_have_their_radii(kind, median_mm, bias_mm,
     distances: list[float] = []
     radii: list[float] = []
     known: list[float] = []  # errors over the deviation that is reported
-    for one in frames(kind):
-        solver.tare(one.untouched_v)
-        solver.forget()
-        found = solver.reconstruct(one.touched_v).touches
-        matched = match(one.scene.centres_mm(), [(t.x_mm, t.y_mm) for t in found])
+    for one, found, matched in found_by(solver, kind):
         distances += matched.distances_mm
         radii += [found[j].radius_mm - one.scene.touches[i].radius_mm for i, j in matched.pairs]
         known += [
