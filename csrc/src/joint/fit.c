@@ -123,7 +123,7 @@ static void finish_normal(eits_context *ctx, const eits_joint *j, const sums *s)
     for (uint32_t a = 0; a < j->free_count * j->parameters; ++a) {
         const uint32_t p = a % j->parameters;
         const eits_shape *shape = &j->shape[j->free[a / j->parameters]];
-        const eits_real prior = eits_joint_precision(ctx, shape, p);
+        const eits_real prior = eits_joint_precision(shape, p);
         eits_real *row = eits_lower_row(m->normal, a), *along = along_of(ctx, a);
         eits_joint_finish_along(ctx, along);
         m->gradient[a] -= product(along, s->along, nuisances);
@@ -293,8 +293,9 @@ void eits_joint_free_all(eits_joint *j)
         j->free[k] = k;
 }
 
-/* What a change of the prior of log |amplitude| to that of the other kind brings: A + D e e' and
- * the gradient g e instead of A and 0, so that the step is g A^-1 e / (1 + D e'A^-1 e). */
+/* Note the step and the rise of F if the prior of log |amplitude| became that of the other kind:
+ * the normal equations change from A to A + D e e' and the gradient from 0 to g e, so that the step
+ * is g A^-1 e / (1 + D e'A^-1 e). */
 static void know_other(const eits_shape *shape, const eits_real *block, eits_joint_known *known)
 {
     const eits_real *amplitude = block + EITS_LOWER_SIZE(3); /* row 3 of A^-1 */
@@ -308,8 +309,7 @@ static void know_other(const eits_shape *shape, const eits_real *block, eits_joi
 }
 
 /* By the block of A^-1 of one shape's parameters: its inverse is what all others leave of A. */
-static void know(const eits_context *ctx, const eits_joint *j, uint32_t k, eits_real *block,
-                 eits_joint_known *known)
+static void know(const eits_joint *j, uint32_t k, eits_real *block, eits_joint_known *known)
 {
     const uint32_t amplitude = 3, p = j->parameters;
     eits_real unit[EITS_JOINT_ELLIPSE] = {0};
@@ -332,7 +332,7 @@ static void know(const eits_context *ctx, const eits_joint *j, uint32_t k, eits_
     eits_lower_solve(block, p, unit);
     eits_lower_solve_transposed(block, p, unit);
     /* a prior is no evidence */
-    known->rise = unit[amplitude] - eits_joint_precision(ctx, &j->shape[k], amplitude);
+    known->rise = unit[amplitude] - eits_joint_precision(&j->shape[k], amplitude);
 }
 
 uint64_t eits_joint_places(eits_context *ctx, const eits_joint *j, eits_joint_known *known)
@@ -348,7 +348,7 @@ uint64_t eits_joint_places(eits_context *ctx, const eits_joint *j, eits_joint_kn
             for (uint32_t l = 0; l <= i; ++l)
                 eits_lower_row(block, i)[l] = column[k * p + l];
         }
-        know(ctx, j, k, block, &known[k]);
+        know(j, k, block, &known[k]);
     }
     return (uint64_t)n * n * (n / 6u + n);
 }

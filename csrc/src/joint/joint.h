@@ -62,7 +62,8 @@ uint64_t eits_joint_evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds);
 void eits_joint_descend(eits_context *ctx, eits_joint *j, uint32_t rounds, eits_real hopeless,
                         uint64_t *macs);
 
-/* What F would fall to by the linearisation about *j, from nothing induced. Adds to `macs`. */
+/* Return the F that the linearisation about *j predicts, where nothing is induced yet. Adds to
+ * `macs`. */
 eits_real eits_joint_expect(eits_context *ctx, eits_joint *j, uint64_t *macs);
 
 /* The same from an evaluation about *j, which is the last that was made. */
@@ -72,6 +73,12 @@ void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, u
 void eits_joint_keep(eits_context *ctx, const eits_joint *j);
 void eits_joint_back(eits_context *ctx, const eits_joint *j);
 
+/* Strength q r^2 of a shape, with its sign. */
+static inline eits_real eits_joint_strength(const eits_shape *s)
+{
+    return s->amplitude * s->radius * s->radius;
+}
+
 /* All shapes are varied. */
 void eits_joint_free_all(eits_joint *j);
 
@@ -80,10 +87,10 @@ void eits_joint_free_all(eits_joint *j);
 /* The prior's part of F for one shape. */
 eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_t parameters);
 
-/* How far parameter p of a shape is from where its prior has it, and 1 / variance of that prior; 0
- * for places, which have none. */
+/* The distance of a shape's parameter p from the mean of its prior, and 1 / variance of that prior.
+ * Both are 0 for places, which have no prior. */
 eits_real eits_joint_offset(const eits_context *ctx, const eits_shape *s, uint32_t p);
-eits_real eits_joint_precision(const eits_context *ctx, const eits_shape *s, uint32_t p);
+eits_real eits_joint_precision(const eits_shape *s, uint32_t p);
 
 /* Whether the shape is likelier a light touch than a strong one; and the shape of its strength q
  * r^2 that is strong, or of the kind that it is not. */
@@ -95,8 +102,8 @@ eits_shape eits_joint_as_other(const eits_shape *s);
  * alone. */
 void eits_joint_guess_kinds(const eits_context *ctx, eits_joint *j);
 
-/* What becomes of F where the shape stands, and of its normal equations for log |amplitude|, if
- * the shape counts as the other kind. */
+/* The changes of F where the shape stands, and of its normal equations for log |amplitude|, if the
+ * shape counts as the other kind. */
 typedef struct eits_joint_change {
     eits_real cost, precision, gradient;
 } eits_joint_change;

@@ -34,7 +34,7 @@ static eits_shape of_group(const eits_joint *j, const uint32_t *group, uint32_t 
     eits_real weight = 0, x = 0, y = 0, area = 0, sum = 0, difference = 0, product = 0;
     for (uint32_t k = of; k < j->count; ++k) {
         const eits_shape *s = &j->shape[k];
-        const eits_real strength = group[k] == of ? s->amplitude * s->radius * s->radius : 0;
+        const eits_real strength = group[k] == of ? eits_joint_strength(s) : 0;
         weight += strength;
         x = eits_fma(strength, s->x, x);
         y = eits_fma(strength, s->y, y);

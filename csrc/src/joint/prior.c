@@ -1,4 +1,4 @@
-/* What touches are like, before the data are seen.
+/* The priors of touches: what is assumed of them before the data are seen.
  *
  * The data tell a touch's strength q r^2 far better than its radius r or its amplitude q, so the
  * two come from what touches are expected to be. Radii spread about that of a fit's seed. Touches
@@ -75,9 +75,8 @@ static eits_real deviation(const eits_shape *s, uint32_t p)
                     : EITS_JOINT_SHAPE_SPREAD;
 }
 
-eits_real eits_joint_precision(const eits_context *ctx, const eits_shape *s, uint32_t p)
+eits_real eits_joint_precision(const eits_shape *s, uint32_t p)
 {
-    (void)ctx;
     return p < 2 ? 0 : 1 / (deviation(s, p) * deviation(s, p));
 }
 
@@ -94,7 +93,7 @@ eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_
 /* The shape of the same strength q r^2 that has the amplitude of `as`. */
 static eits_shape shape_as(const kind *as, const eits_shape *s)
 {
-    const eits_real strength = eits_fabs(s->amplitude) * s->radius * s->radius;
+    const eits_real strength = eits_fabs(eits_joint_strength(s));
     eits_shape out = *s;
     out.radius = eits_sqrt(strength / as->amplitude);
     out.amplitude = s->amplitude < 0 ? -as->amplitude : as->amplitude;

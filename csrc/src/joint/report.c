@@ -45,13 +45,11 @@ static void leave_out_weak(const eits_context *ctx, eits_joint *j)
     eits_real greatest = 0;
     uint32_t count = 0;
     for (uint32_t k = 0; k < j->count; ++k) {
-        const eits_shape *s = &j->shape[k];
-        greatest = eits_larger(greatest, eits_fabs(s->amplitude) * s->radius * s->radius);
+        greatest = eits_larger(greatest, eits_fabs(eits_joint_strength(&j->shape[k])));
     }
     for (uint32_t k = 0; k < j->count; ++k) {
         const eits_shape *s = &j->shape[k];
-        if (!is_inside(ctx, s) ||
-            eits_fabs(s->amplitude) * s->radius * s->radius < EITS_JOINT_WEAK * greatest)
+        if (!is_inside(ctx, s) || eits_fabs(eits_joint_strength(s)) < EITS_JOINT_WEAK * greatest)
             continue;
         j->from[count] = j->from[k];
         j->shape[count++] = *s;
@@ -91,7 +89,8 @@ static void inherit(eits_fit *f, uint32_t of, uint32_t k)
     f->confidence[k] = f->confidence[of];
 }
 
-/* What the shapes leave of the data beyond noise and the model's errors. */
+/* Return the part of the data's energy that the shapes leave beyond noise and the model's errors.
+ */
 static eits_real left_beyond_noise(const eits_context *ctx, const eits_joint *j)
 {
     return eits_larger(j->misfit - eits_joint_freedom(ctx, j), 0);

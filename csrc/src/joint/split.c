@@ -40,7 +40,7 @@ static void direction(const eits_shape *s, int d, eits_real axis[2])
     axis[1] = eits_fma(sine[d], along[0], cosine[d] * along[1]);
 }
 
-/* How far a shape reaches along the unit vector: the ellipse's half width there. */
+/* Return the half width of the ellipse along a unit vector. */
 static eits_real reach(const eits_shape *s, eits_real x, eits_real y)
 {
     const eits_real eta = eits_pole_eta(s), r2 = s->radius * s->radius;
@@ -89,9 +89,8 @@ static eits_joint as_two(const eits_joint *one, uint32_t k, int d)
 static int are_two(const eits_shape *a, const eits_shape *b)
 {
     const eits_real dx = a->x - b->x, dy = a->y - b->y,
-                    apart = eits_sqrt(eits_fma(dx, dx, dy * dy)),
-                    p = a->amplitude * a->radius * a->radius,
-                    q = b->amplitude * b->radius * b->radius;
+                    apart = eits_sqrt(eits_fma(dx, dx, dy * dy)), p = eits_joint_strength(a),
+                    q = eits_joint_strength(b);
     if (!(apart > 0))
         return 0;
     const eits_real touching = EITS_JOINT_SPLIT_APART * (reach(a, dx / apart, dy / apart) +
@@ -107,7 +106,7 @@ static int is_large(const eits_context *ctx, const eits_shape *s)
     return eits_joint_is_light(s) && eits_joint_offset(ctx, s, 2) > EITS_JOINT_LIGHT_LARGE;
 }
 
-/* By how much F has to fall where a shape becomes two. */
+/* Return the least fall of F where a shape becomes two. */
 static eits_real needed_fall(const eits_context *ctx, const eits_shape *one)
 {
     if (is_large(ctx, one))
