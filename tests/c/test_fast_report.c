@@ -52,7 +52,7 @@ TEST(a_followed_touch_is_what_was_found_near_it)
     CHECK(touches[1].confirmed == 0 && touches[1].explained == 0);
 }
 
-/* What drives do not follow counts from its second frame on, once for each touch before. */
+/* A touch that drives do not follow counts from its second frame on, once for each touch before. */
 TEST(a_touch_of_frames_alone_was_there_before)
 {
     const eits_touch found[] = {found_at(1, -40, 5), found_at(2, -42, 4)};

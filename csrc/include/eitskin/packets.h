@@ -18,9 +18,9 @@ extern "C" {
 /* The first byte of every packet; a packet of another version is rejected. */
 #define EITS_LINK_VERSION     6u
 #define EITS_LINK_MAX_PAYLOAD 16384u
-/* Of SETTINGS: a number stays as it is. */
+/* In SETTINGS this value leaves a number as it is. */
 #define EITS_KEPT             0xFFFFFFFFu
-/* Of PROBE: all electrodes are open. */
+/* In PROBE this value opens all electrodes. */
 #define EITS_PROBE_OPEN       0xFFFFFFFFu
 /* The most characters of a board's name. */
 #define EITS_NAME_CHARACTERS  32u

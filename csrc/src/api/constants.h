@@ -17,10 +17,10 @@
 
 /* ---- Chosen: exact scenes of the paper's skin at 60 dB, seeds 101 and 303: discs, ellipses,
  * squares, bars, shapes of two and three lobes, palms, light touches; nine frames of a water tank.
- * Of shapes that touches explain they leave less than 1 %, of others 2 to 60 %. Frames that are not
- * fitted jointly (a model without sections UNCE or ROWE, log-ratio data, a reference far from the
- * model) leave more: of the tank's frames touches leave 2 to 11 %, and their picture is the better
- * one in each. Check: scripts/test tests/python/acceptance/test_shown_image.py */
+ * Touches leave less than 1 % of shapes that they explain, and 2 to 60 % of others. Frames that are
+ * not fitted jointly (a model without sections UNCE or ROWE, log-ratio data, a reference far from
+ * the model) leave more: of the tank's frames touches leave 2 to 11 %, and their picture is the
+ * better one in each. Check: scripts/test tests/python/acceptance/test_shown_image.py */
 
 /* what touches may leave unexplained where their picture shows the frame [of the data's energy].
  * larger: shapes that are no ellipses are shown as discs; smaller: blurred images of touches */

@@ -27,7 +27,7 @@ static int may_have_touches(const eits_context *ctx)
            stop != EITS_STOP_DIVERGED;
 }
 
-/* What the discs leave unexplained, and of that what is no noise. */
+/* Note the share of the data that the discs leave unexplained, and the part of it beyond noise. */
 static void note_unexplained(eits_context *ctx, eits_fit *f)
 {
     const eits_real left = f->total > 0 ? eits_fit_left(ctx, f) : 0;

@@ -1,9 +1,8 @@
 /* The bits of every result rest on this arithmetic: each operation is rounded once, to eits_real,
- * in the order written. Every source file that computes
- * includes this header. The preprocessor checks the flags
- * that a compiler reports. A product and a sum are not contracted to a fused multiply-add where a
- * pragma forbids it; clang ignores the pragma under -ffp-contract=fast. Contraction and
- * re-association by other flags are not reported, so eits_init tries them. */
+ * in the order written. Every source file that computes includes this header. The preprocessor
+ * checks the flags that a compiler reports. A product and a sum are not contracted to a fused
+ * multiply-add where a pragma forbids it; clang ignores the pragma under -ffp-contract=fast.
+ * Contraction and re-association by other flags are not reported, so eits_init tries them. */
 #ifndef EITSKIN_ARITHMETIC_H
 #define EITSKIN_ARITHMETIC_H
 

@@ -130,7 +130,7 @@ void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient)
     const eits_real min = EITS_STALE_NOISE * ctx->info.lambda_noise;
     if (!(min > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > min))
         return;
-    /* Of another scale, too: touches do not explain that. */
+    /* The diagnostic stays if another scale raised it before: touches do not explain that. */
     ctx->range.against = (ctx->info.diagnostics & EITS_DIAGNOSTIC_STALE_REFERENCE) == 0;
     ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
 }

@@ -282,7 +282,7 @@ void eits_take_second_frame(eits_context *ctx)
  * other. A touch that lands, moves or lifts changes both alike. So each frame is compared with the
  * mean so far, pair by pair, and two energies are summed: that of the common part of a pair's
  * changes, and that of their difference. Without a touch they are equal up to chance. The common
- * part along the reference itself is left out, because drift of the gain is no touch.
+ * part along the reference itself is left out, because the gain may drift without a touch.
  *
  * A frame whose pairs agree to the last bit was measured by half, and shows nothing. Protocols
  * without reciprocals, and references from a single frame, are not examined. */

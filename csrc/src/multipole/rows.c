@@ -148,8 +148,8 @@ static void whole_field(const eits_real *own, const eits_real *induced, uint32_t
     }
 }
 
-/* Of answers c and x to the fields a_k and (k + 1) a_k+1, the slopes by place: a shift of the
- * middle by dx changes a_k by (k + 1) a_k+1 dx on both sides, one by dy by i times that. */
+/* Put the slopes by place, from the answers c and x to the fields a_k and (k + 1) a_k+1: a shift of
+ * the middle by dx changes a_k by (k + 1) a_k+1 dx on both sides, and one by dy by i times that. */
 static inline void put_moves(drive *d, uint32_t orders, const eits_complex *c, eits_complex *x,
                              eits_complex *y)
 {
@@ -326,7 +326,7 @@ static void fill_any_row(const drive *d, const eits_real *own, uint32_t electrod
     }
 }
 
-/* What a drive's rows take. */
+/* The numbers of a drive that its rows share. */
 static void make_drive(const eits_shape *shape, const answering s[3], const order_weights *by_q,
                        uint32_t slopes, const eits_complex *a, drive *d)
 {

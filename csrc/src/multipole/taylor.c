@@ -172,8 +172,8 @@ static void make_basis(const points *p, basis *b)
     }
 }
 
-/* What each point's F adds to each coefficient: T^-1 Q* W, then of z and not of z / EITS_POLE_UNIT.
- * Coefficients that the points do not tell are 0. */
+/* The weight of each point's F in each coefficient: T^-1 Q* W, in powers of z instead of z /
+ * EITS_POLE_UNIT. Coefficients that the points do not determine are 0. */
 static void weigh_points(const points *p, const basis *b, eits_complex *weight)
 {
     for (uint32_t i = 0; i < p->count; ++i) {

@@ -21,7 +21,7 @@
 
 #define FW_SCAN_DRIVES 32u
 
-/* What the scan measures in a slot. */
+/* The row that the scan measures in a slot, and how. */
 typedef struct fw_scan_row {
     uint32_t addresses; /* of the multiplexers, if `valid` */
     uint32_t position;  /* in the list of rows */

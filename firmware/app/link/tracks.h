@@ -13,7 +13,7 @@ typedef struct fw_host_link fw_host_link;
 
 void fw_tracks_init(fw_host_link *link);
 
-/* What of a stream asks for touches. */
+/* The bits of a stream that ask for touches. */
 #define FW_TRACKED (EITS_STREAM_TOUCHES | EITS_STREAM_EVENTS | EITS_STREAM_DRIVE_TOUCHES)
 
 /* Drives wait until the release. */

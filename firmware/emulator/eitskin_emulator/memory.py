@@ -55,7 +55,7 @@ class Memories:
         self._map(SYSTEM, self.system, 0, SYSTEM_BYTES, UC_PROT_READ)
 
     def protect_itcm(self, at: int, denied: bool, read_only: bool) -> None:
-        """What the MPU forbids in ``ITCM_PAGE`` bytes of ITCM from ``at`` on."""
+        """The accesses that the MPU forbids in ``ITCM_PAGE`` bytes of ITCM from ``at`` on."""
         allowed = UC_PROT_READ | UC_PROT_EXEC if read_only else UC_PROT_ALL
         self._engine.mem_protect(at, ITCM_PAGE, UC_PROT_NONE if denied else allowed)
 

@@ -53,7 +53,7 @@ def nucleo() -> Kind:
 
 
 def place(wire: Wire) -> str:
-    """Where the shield reaches a pin: the Zio connector where it has the pin."""
+    """The place where the shield reaches a pin: on a Zio connector if one has the pin."""
     return wire.zio or wire.morpho
 
 

@@ -12,8 +12,8 @@ from eitskin_hardware.circuit.instrument import build_circuit
 
 @dataclass(frozen=True)
 class Checked:
-    """What the electrical rules check and the netlist say. ``messages`` are the check's errors and
-    warnings."""
+    """The netlist, and ``messages`` with the errors and warnings of the electrical rules
+    check."""
 
     netlist: str
     messages: tuple[str, ...]

@@ -1,5 +1,5 @@
-"""Which pin of the NUCLEO-F767ZI goes where: the circuit, the table of docs/guide/hardware.md and
-the drawing of the wiring are made from it.
+"""The pins of the NUCLEO-F767ZI and what each is joined to: the circuit, the table of
+docs/guide/hardware.md and the drawing of the wiring are made from it.
 
 Connectors and pins after ST's UM1974, tables 18 and 25: the Zio connectors CN7 to CN10 take plugs,
 the morpho ones CN11 and CN12 are holes in the board, with every pin of the processor.

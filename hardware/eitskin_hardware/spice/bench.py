@@ -52,8 +52,8 @@ class Switching:
 
 @dataclass(frozen=True)
 class Bench:
-    """What is simulated. ``row`` is what the firmware sets on its pins; None: all disabled.
-    ``plus_v`` and ``minus_v`` are the supplies, None: not connected."""
+    """A circuit to simulate. ``row`` is what the firmware sets on its pins; None disables all.
+    ``plus_v`` and ``minus_v`` are the supplies; None leaves one unconnected."""
 
     design: Design
     load: Load | None = None

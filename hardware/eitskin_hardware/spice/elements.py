@@ -25,8 +25,8 @@ def node(net: str) -> str:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What the deck is written for: ``offset_v`` is of every amplifier, ``body`` adds the diodes
-    from a multiplexer's pins to its supplies."""
+    """The case that the deck is written for: every amplifier has ``offset_v``, and ``body`` adds
+    the diodes from a multiplexer's pins to its supplies."""
 
     offset_v: float = 0.0
     body: bool = False

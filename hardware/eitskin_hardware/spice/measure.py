@@ -316,7 +316,7 @@ def supply_numbers(design: Design) -> Numbers:
 
 
 def before() -> Numbers:
-    """What the circuit as it was described does."""
+    """The numbers of the circuit as it was described."""
     design = as_before()
     numbers = source(design)
     numbers |= {key: value for key, value in receiver(design).items() if key != "clamped_v"}

@@ -1,4 +1,4 @@
-"""What the firmware makes of a course of voltage: samples, codes, amplitude."""
+"""Samples, codes and amplitude that the firmware makes of a voltage over time."""
 
 import numpy as np
 

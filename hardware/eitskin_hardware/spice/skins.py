@@ -1,5 +1,5 @@
-"""What is connected to the electrodes, as a network: a skin by the model's own forward solution, a
-ring of resistors, or one resistor."""
+"""Networks at the electrodes: a skin by the model's own forward solution, a ring of resistors, or
+one resistor."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What a stage of the bring-up measured and what that means."""
+"""The findings of a stage of the bring-up: what was measured, and what it means."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What a burst of codes says: mean, amplitude, phase, noise, frequency and how fast it settled."""
+"""Mean, amplitude, phase, noise, frequency and settling time of a burst of codes."""
 
 from dataclasses import dataclass
 

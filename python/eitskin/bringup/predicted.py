@@ -1,5 +1,5 @@
-"""What the simulation of the circuit predicts (``hardware/made/results.json``, ngspice), by its
-names there; a test compares them."""
+"""Predictions by the simulation of the circuit (ngspice), with their names in
+``hardware/made/results.json``; a test compares them."""
 
 SINE_PP_V = 0.612  # sine_pp_v: at the generator's output
 CONVERTER_BIAS_V = 1.65  # converter_bias_v

@@ -48,7 +48,8 @@ def decode(levels: Sequence[float | None], step: float, expected: FloatArray) ->
 
 
 def explain(name: str, seen: Sequence[int | None]) -> str:
-    """Which mistake in the address lines of multiplexer ``name`` gives this map; empty: none."""
+    """Return the mistake in the address lines of multiplexer ``name`` that gives this map; empty:
+    none."""
     right = list(range(ELECTRODES))
     if list(seen) == right:
         return ""

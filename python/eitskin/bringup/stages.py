@@ -222,7 +222,7 @@ def amplifier(bench: Bench) -> StageReport:
 
 
 def multiplexers(bench: Bench) -> StageReport:
-    """Which electrode each multiplexer joins at each address, by a ring of 1 kohm."""
+    """Find the electrode that each multiplexer joins at each address, by a ring of 1 kohm."""
     bench.connect("ring")
     probe, report = bench.probe, StageReport("multiplexers")
     expected = levels_ohm(1.0)

@@ -14,7 +14,7 @@ EXIT_WRONG = 1
 
 
 class Person:
-    """Whoever is at the bench: told by standard error, and asked where that is a terminal."""
+    """The person at the bench. They read standard error, and are asked if it is a terminal."""
 
     def __init__(self) -> None:
         self._there = sys.stdin.isatty() and sys.stderr.isatty()

@@ -146,9 +146,10 @@ class Device(CommandExchange):
             self.command(commands.Tare(0), ANSWER_S)
 
     def unserved(self) -> str | None:
-        """What of the skin source and amplifier do not serve, and which part to change; None:
-        nothing, or the board does not know. It takes a raw frame, unless somebody reads the
-        frames."""
+        """Return what source and amplifier do not serve of the skin, and which part to change.
+
+        None: they serve it, or the board does not know. It takes a raw frame, unless somebody reads
+        the frames."""
         if not self.board.gain_ppm or not self.reader.idle:
             return None
         raw = [item for item in self.stream(Stream.RAW, frames=3) if isinstance(item, RawFrame)]

@@ -28,7 +28,7 @@ def frame_id(source: TouchSource) -> str:
 
 
 def topics_of(source: TouchSource) -> str:
-    """What topics begin with: the source's name, if it has one."""
+    """Return the beginning of each topic: the source's name, if it has one."""
     return "" if source.name is None else f"/{source.name}"
 
 

@@ -1,5 +1,5 @@
-"""What other programs do with frames in which something is wrong: numpy, scikit-learn and pyEIT
-beside this project's C core.
+"""Frames in which something is wrong, given to numpy, scikit-learn, pyEIT and this project's C
+core.
 
 All get the same frames of random scenes, and the same Jacobian but for pyEIT, which makes its own.
 Each method's threshold of MIoU, and its parameter, are the best on the clean frames. Spoilt frames
@@ -162,7 +162,7 @@ class _Judge:
         self._untouched, self._frames = simulated.untouched_v, simulated.frames_v
 
     def answers(self, tried: Sequence[Images]) -> tuple[str, ...]:
-        """What the best of ``tried`` on the clean frames answers to each case."""
+        """Return the answer to each case of the method that is best on the clean frames."""
         clean = [self._curve(images(self._untouched, self._frames)) for images in tried]
         best = int(np.argmax([curve.max() for curve in clean]))
         at = int(np.argmax(clean[best]))

@@ -150,7 +150,7 @@ def effects_cells(result: dict[str, Any]) -> Tabular:
 
 
 def effects_filling(result: dict[str, Any], command: str) -> Filling:
-    """What ``--page`` writes."""
+    """Return the texts and the table that ``--page`` writes."""
     conditions = (
         f"A touch crosses the skin in {result['frames']} frames, on about 3,000 elements; effects"
         f" have their defaults. Median of {result['rounds']} interleaved rounds, compile and run,"

@@ -1,4 +1,4 @@
-"""What a method costs on this computer: time for one frame, and the numbers that it keeps."""
+"""The cost of a method on this computer: time for one frame, and bytes that it keeps."""
 
 from dataclasses import dataclass
 from time import perf_counter

@@ -1,4 +1,4 @@
-"""What each effect of a scene costs, as bars beside the scene without effects."""
+"""Bars of the cost of each effect of a scene, beside the scene without effects."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""What scripts/embed makes of the tree: one file, and a package for Arduino, PlatformIO, ESP-IDF
+"""The results of scripts/embed: one file, and a package for Arduino, PlatformIO, ESP-IDF
 and Zephyr. The toolchains of these are not here: their rules are read by stand-ins, and the sources
 are compiled by the processor's own compiler."""
 

@@ -1,4 +1,4 @@
-"""What works with the plain dependencies, and what a command says that lacks extras."""
+"""The wheel with its plain dependencies: what works, and how a command names missing extras."""
 
 import json
 import re

@@ -1,5 +1,4 @@
-"""What a maker puts on the electrodes during bring-up: resistors between them, solved as a
-network."""
+"""Resistors that a maker puts between the electrodes during bring-up, solved as a network."""
 
 from collections.abc import Mapping
 
@@ -32,7 +31,7 @@ class Fixture:
         return float(ohm[c, a] - ohm[c, b] - ohm[d, a] + ohm[d, b])
 
     def load_ohm(self, joined: Joined) -> float:
-        """What the current source sees; much where the path is open."""
+        """The resistance at the current source; it is large where the path is open."""
         a, b, *_ = joined
         return LEAK_OHM if a is None or b is None else self.transfer_ohm((a, b, a, b))
 

@@ -4,7 +4,7 @@ LINE_BITS, SETS, WAYS = 5, 128, 4
 
 
 class Cache:
-    """Which lines are in it; no contents."""
+    """A cache that knows which lines it holds, without their contents."""
 
     def __init__(self, random_replacement: bool) -> None:
         self._random = random_replacement

@@ -1,4 +1,4 @@
-"""How long after a burst's last sample the multiplexers join the next row."""
+"""The time from a burst's last sample until the multiplexers join the next row."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

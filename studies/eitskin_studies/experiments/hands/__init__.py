@@ -34,7 +34,7 @@ class Kind:
 
 
 def kinds() -> list[Kind]:
-    """Those of the page."""
+    """Return the kinds of scenes that the page has."""
     listed = [
         Kind("piano", scenes.piano),
         Kind("chord of 3 to 5", scenes.chord),

@@ -25,7 +25,7 @@ CROWDED_MM, CROWDED = 34.0, 4  # two fingers as near as this, or so many of them
 
 @dataclass
 class Judged:
-    """What a stream reported; errors and delays in mm and s.
+    """The reports of a stream, judged; errors and delays are in mm and s.
 
     ``reports``, ``frames`` count them, ``*_false`` those with a false touch. ``untrue`` counts
     frames with a diagnostic that is not true. ``still``: errors of fingers that do not move while

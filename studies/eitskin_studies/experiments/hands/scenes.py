@@ -50,7 +50,7 @@ class Finger:
         return np.asarray(self.begin + np.clip(way, 0.0, 1.0) * (self.end - self.begin))
 
     def table(self) -> dict[str, Any]:
-        """Of a scene's [[touch]]."""
+        """Return the table [[touch]] of a scene."""
         keys = [(self.from_s, self.begin, 0.0), (self.whole_s, self.begin, 1.0)]
         keys += [(self.moves_s, self.begin, 1.0), (self.off_s, self.end, 1.0)]
         keys += [(self.gone_s, self.end, LEFT if self.creeps else 0.0)]
