@@ -63,7 +63,7 @@ eits_status eits_fast_report(const eits_fast_touch *tracked, uint32_t n_tracked,
         }
         ++*count;
     }
-    /* A touch that drives do not follow, such as the seventh, is reported where the frame before
+    /* A touch that drives do not follow, such as the sixth, is reported where the frame before
      * showed it, too: a single frame may show a touch that landed while it was scanned aside. */
     for (uint32_t n = 0; n < n_found && *count < EITS_MAX_TOUCHES; ++n) {
         const uint32_t last =

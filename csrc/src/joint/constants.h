@@ -130,11 +130,6 @@
  * JOINT_SPLIT_FALL */
 #define EITS_JOINT_SPLIT_FAR R(5.0)
 
-/* factor of that where the touch is not long: an edge that is less sharp than the model's looks
- * like two fingers side by side, too. larger: fingers side by side count as one; smaller: soft
- * touches become two */
-#define EITS_JOINT_SPLIT_ROUND R(4.0)
-
 /* a light touch that is larger by more is tried as two strong ones though the data fit [log of the
  * expected radius]. larger: pairs count as one light touch; smaller: costs */
 #define EITS_JOINT_LIGHT_LARGE R(0.33)

@@ -109,12 +109,8 @@ static int is_large(const eits_context *ctx, const eits_shape *s)
 /* Return the least fall of F where a shape becomes two. */
 static eits_real needed_fall(const eits_context *ctx, const eits_shape *one)
 {
-    if (is_large(ctx, one))
-        return (eits_weighs_errors(ctx) ? EITS_JOINT_SPLIT_FAR : 1) * EITS_JOINT_SPLIT_LARGE;
-    if (eits_weighs_errors(ctx))
-        return EITS_JOINT_SPLIT_FAR * EITS_JOINT_SPLIT_FALL;
-    return (eits_pole_eta(one) > EITS_JOINT_SPLIT_ETA ? 1 : EITS_JOINT_SPLIT_ROUND) *
-           EITS_JOINT_SPLIT_FALL;
+    const eits_real fall = is_large(ctx, one) ? EITS_JOINT_SPLIT_LARGE : EITS_JOINT_SPLIT_FALL;
+    return eits_weighs_errors(ctx) ? EITS_JOINT_SPLIT_FAR * fall : fall;
 }
 
 /* Whether the two that shape k became stand, beside `one`. */
