@@ -114,6 +114,7 @@ EXTRAS = {  # the packages of each extra, and the module by which each is found
     "model": {"scipy": "scipy", "netgen-mesher": "netgen"},
     "plot": {"matplotlib": "matplotlib"},
     "drawing": {"svgelements": "svgelements", "ezdxf": "ezdxf"},
+    "surface": {"trimesh": "trimesh", "fast-simplification": "fast_simplification"},
     "view": {"starlette": "starlette", "uvicorn": "uvicorn", "websockets": "websockets"},
     "completion": {"shtab": "shtab"},
     "osc": {"python-osc": "pythonosc"},

@@ -14,12 +14,12 @@ from eitskin.model.eitm_sections import REQUIRED, Sections, decode_sections, enc
 from eitskin.model.model import GAIN_DRIFT_KEPT, TRACKS_REFERENCE, Model
 
 MAGIC = b"EITM"
-MAJOR, MINOR = 1, 11
+MAJOR, MINOR = 1, 12
 HEADER = struct.Struct("<4sHHIIIIQ32x")
 ENTRY = struct.Struct("<4sIII")
 OPTIONAL = (
     "SCAL", "META", "FLDS", "LOAD", "WHIT", "UNCE", "GEOM", "MOVE", "ROWE", "PREC", "PLAC", "ORDR",
-    "SUMS",
+    "SUMS", "SURF",
 )  # fmt: skip
 REQUIRED_FLAG = 1
 MAX_SECTIONS = 256
@@ -47,7 +47,7 @@ def _assemble(sections: Sections, protocol_hash: int, taught: bool) -> bytes:
         bodies.append(_padded(content))
         offset += len(bodies[-1])
     body = b"".join(entries + bodies)
-    newest = ("ROWE", "MOVE", "GEOM", "PLAC", "SUMS", "ORDR", "PREC", "UNCE")
+    newest = ("SURF", "ROWE", "MOVE", "GEOM", "PLAC", "SUMS", "ORDR", "PREC", "UNCE")
     have = [name in sections or (taught and name == "PREC") for name in newest]
     minor = MINOR - [*have, True].index(True)
     tail = HEADER.pack(MAGIC, MAJOR, minor, offset, 0, len(sections), 0, protocol_hash)[16:]

@@ -35,6 +35,7 @@ from eitskin.model.row_form import decode_row_form
 from eitskin.model.storage import DTYPES, STORAGES, StoredMatrix, stride_for
 from eitskin.skin.electrodes import MAX_COUNT, MIN_COUNT
 from eitskin.skin.protocol import Protocol, Reciprocity
+from eitskin.surface.section import decode_surface, encode_surface
 
 REQUIRED = ("DIMS", "PROT", "FOLD", "VREF", "REDU", "SENS", "COLW", "GRID", "DEFS", "GOLD")
 DIMS = struct.Struct("<10I6f")
@@ -105,6 +106,8 @@ def encode_sections(model: Model) -> Sections:
             sections |= model.model_errors.places.encode()
             if model.model_errors.rows is not None:
                 sections["ROWE"] = model.model_errors.rows.encode()
+    if model.surface is not None:
+        sections["SURF"] = encode_surface(model.surface)
     if stored.scale is not None:
         sections["SCAL"] = stored.scale.astype("<f4").tobytes()
     if model.fields is not None:
@@ -407,6 +410,7 @@ def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model
         precision=_read_precision(sections, d, where),
         place_factor=_read_place_factor(sections, where),
         model_errors=_read_model_errors(sections, d, where),
+        surface=decode_surface(sections["SURF"], where) if "SURF" in sections else None,
     )
 
 

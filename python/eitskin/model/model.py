@@ -17,6 +17,7 @@ from eitskin.model.row_form import RowForm
 from eitskin.model.storage import StoredMatrix
 from eitskin.skin.protocol import Protocol, Reciprocity
 from eitskin.skin.skin import Skin, skin_from_table
+from eitskin.surface.surface_map import SurfaceMap
 
 DATA_KINDS = ("difference", "normalised", "log-ratio")
 GAIN_DRIFT_KEPT = 8  # a bit of touch_fit_left_out: changes along the reference are kept as data
@@ -89,7 +90,8 @@ class Model:
     converts strengths to forces if the skin was calibrated. ``model_errors`` state how far a real
     skin may differ from the model. ``precision`` (k (k + 1) / 2,) belongs to taught models: the
     lower triangle of the inverse covariance of the rows' noise. ``place_factor`` multiplies the
-    covariance of a place from the fit; 0 means unknown.
+    covariance of a place from the fit; 0 means unknown. ``surface`` maps the plane of the model to
+    the surface that the skin covers; None is a flat skin.
     """
 
     protocol: Protocol
@@ -112,6 +114,7 @@ class Model:
     model_errors: ModelErrors | None = None
     precision: npt.NDArray[np.float32] | None = None
     place_factor: float = 0.0
+    surface: SurfaceMap | None = None
 
     def __repr__(self) -> str:
         name = self.meta.get("skin", {}).get("skin", {}).get("name", "of a skin without a name")

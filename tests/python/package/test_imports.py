@@ -21,7 +21,7 @@ ORDER = (
     {"errors", "arrays", "process", "progress"},
     {"fileio", "threads"},
     {"config"},
-    {"core", "skin", "firmware"},
+    {"core", "skin", "firmware", "surface"},
     {"fem"},
     {"model"},
     {"frames"},

@@ -1,0 +1,147 @@
+"""Surfaces made by formulas, for examples and studies: each is a disk in the sense of topology."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from eitskin.arrays import FloatArray, IntArray
+from eitskin.config import nearest
+from eitskin.errors import UsageError
+
+Place = Callable[[FloatArray, FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A surface by formula: ``place`` takes u and v (k,) from -1 to 1 to points (k, 3) in mm.
+    ``round`` shapes use the disk u^2 + v^2 <= 1, the others the whole square. ``size_mm`` is about
+    the width of the surface."""
+
+    place: Place
+    round: bool
+    size_mm: float
+    what: str
+
+
+def _cylinder(u: FloatArray, v: FloatArray) -> FloatArray:
+    angle, radius = 97.0 * u / 60.0, 60.0
+    return np.column_stack([radius * np.sin(angle), 97.0 * v, radius * np.cos(angle)])
+
+
+def _cone(u: FloatArray, v: FloatArray) -> FloatArray:
+    """The disk of 194 mm, whose middle is 220 mm from the tip, on a cone with a half angle of 20
+    degrees."""
+    half = np.radians(20.0)
+    along, angle = np.hypot(220.0 + 97.0 * v, 97.0 * u), np.arctan2(97.0 * u, 220.0 + 97.0 * v)
+    turn, radius = angle / np.sin(half), along * np.sin(half)
+    return np.column_stack([radius * np.sin(turn), along * np.cos(half), radius * np.cos(turn)])
+
+
+def _hemisphere(u: FloatArray, v: FloatArray) -> FloatArray:
+    rho, turn = np.hypot(u, v), np.arctan2(v, u)
+    polar = rho * np.pi / 2
+    return 60.0 * np.column_stack(
+        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)]
+    )
+
+
+def _saddle(u: FloatArray, v: FloatArray) -> FloatArray:
+    x, y = 80.0 * u, 80.0 * v
+    return np.column_stack([x, y, (x**2 - y**2) / 160.0])
+
+
+def _fingertip(u: FloatArray, v: FloatArray) -> FloatArray:
+    """The pad of a finger: half of a tube of radius 9 mm, 16 mm long, closed by a quarter of a
+    ball."""
+    angle, along = u * np.pi / 2, (v + 1) / 2 * (16.0 + 9.0 * np.pi / 2)
+    polar = np.maximum(along - 16.0, 0.0) / 9.0
+    # the last line of the tube is the point of the ball, so the square's edge v = 1 shrinks; the
+    # pad ends 15 degrees before it
+    polar = polar * (75.0 / 90.0)
+    radius = 9.0 * np.cos(polar)
+    return np.column_stack(
+        [
+            radius * np.sin(angle),
+            np.minimum(along, 16.0) + 9.0 * np.sin(polar),
+            radius * np.cos(angle),
+        ]
+    )
+
+
+def _forearm(u: FloatArray, v: FloatArray, bulge_mm: float = 6.0) -> FloatArray:
+    """A sleeve around a forearm, open along the elbow's side: a tube 200 mm long that narrows from
+    48 to 30 mm, flatter at the wrist, with a muscle that bulges in the upper half."""
+    angle, along = u * np.radians(140.0), (v + 1) / 2
+    wide = 48.0 - 18.0 * along
+    flat = 1.0 - 0.25 * along
+    muscle = bulge_mm * np.exp(-(((along - 0.3) / 0.22) ** 2) - (angle / 0.9) ** 2)
+    return np.column_stack(
+        [
+            (wide + muscle) * np.sin(angle),
+            200.0 * along,
+            (wide * flat + muscle) * np.cos(angle),
+        ]
+    )
+
+
+SHAPES = {
+    "cylinder": Shape(_cylinder, True, 194.0, "a disk of 194 mm around a cylinder of radius 60 mm"),
+    "cone": Shape(_cone, True, 194.0, "a disk of 194 mm on a cone with a half angle of 20 degrees"),
+    "hemisphere": Shape(_hemisphere, True, 190.0, "half a ball of radius 60 mm"),
+    "saddle": Shape(_saddle, True, 160.0, "a saddle, 160 mm across"),
+    "fingertip": Shape(_fingertip, False, 28.0, "the pad of a finger, 28 by 28 mm"),
+    "forearm": Shape(_forearm, False, 210.0, "a sleeve around a forearm, 200 mm long"),
+}
+
+
+def make_shape(name: str, triangles: int = 4000) -> tuple[FloatArray, IntArray]:
+    """Return the points (N, 3) in mm and the triangles (T, 3) of the surface ``name``, about
+    ``triangles`` of them, counterclockwise seen from outside.
+
+    Raises:
+        UsageError: no shape has this name, or ``triangles`` is not within 50 to 2,000,000.
+    """
+    if name not in SHAPES:
+        raise UsageError(f"surface {name!r}: {nearest(name, list(SHAPES))}")
+    if not 50 <= triangles <= 2_000_000:
+        raise UsageError(f"surface: {triangles} triangles is out of range; use 50 to 2000000")
+    shape = SHAPES[name]
+    flat, faces = disk_net(triangles) if shape.round else square_net(triangles)
+    return shape.place(*flat.T), faces
+
+
+def disk_net(triangles: int) -> tuple[FloatArray, IntArray]:
+    """Return places (N, 2) in the disk of radius 1 and triangles (T, 3), about as many as asked:
+    rings of 6, 12, 18... places around the middle."""
+    rings = max(2, round(np.sqrt(triangles / 6)))
+    places, faces = [np.zeros((1, 2))], []
+    for ring in range(1, rings + 1):
+        turn = 2 * np.pi * np.arange(6 * ring) / (6 * ring)
+        places.append(ring / rings * np.column_stack([np.cos(turn), np.sin(turn)]))
+        inner, outer = 3 * (ring - 1) * (ring - 2) + 1, 3 * ring * (ring - 1) + 1
+        for side in range(6):
+            for k in range(ring):
+                a = outer + side * ring + k
+                b = outer + (side * ring + k + 1) % (6 * ring)
+                c = inner + (side * (ring - 1) + k) % max(6 * (ring - 1), 1) if ring > 1 else 0
+                faces.append((a, b, c))
+                if k < ring - 1:
+                    d = inner + (side * (ring - 1) + k + 1) % (6 * (ring - 1))
+                    faces.append((b, d, c))
+    return np.concatenate(places), np.array(faces, dtype=np.int64)
+
+
+def square_net(triangles: int) -> tuple[FloatArray, IntArray]:
+    """Return places (N, 2) in the square from -1 to 1 and triangles (T, 3), about as many as
+    asked; the diagonals alternate."""
+    cells = max(3, round(np.sqrt(triangles / 2)))
+    line = np.linspace(-1, 1, cells + 1)
+    x, y = np.meshgrid(line, line)
+    row, column = np.divmod(np.arange(cells * cells), cells)
+    a = row * (cells + 1) + column
+    b, c, d = a + 1, a + cells + 2, a + cells + 1
+    even = ((row + column) % 2 == 0)[:, None]
+    first = np.where(even, np.column_stack([a, b, c]), np.column_stack([a, b, d]))
+    second = np.where(even, np.column_stack([a, c, d]), np.column_stack([b, c, d]))
+    return np.column_stack([x.ravel(), y.ravel()]), np.concatenate([first, second]).astype(np.int64)
