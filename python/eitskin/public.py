@@ -11,7 +11,7 @@ from eitskin.model.model import Model
 from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_or_prebuilt
 from eitskin.session.frame import Frame, Notice
-from eitskin.session.session import Session
+from eitskin.session.robot_session import AnySession, open_session
 from eitskin.session.settings import SessionSettings, kinds_of
 from eitskin.session.zones import load_zones
 from eitskin.sinks.outputs import attached_outputs
@@ -66,15 +66,15 @@ def stream(
 
     Args:
         url: as ``eitskin stream --device``: "auto", "serial:PORT", "sim:SCENE", "emu:SCENE",
-            "file:RUN.eits".
+            "file:RUN.eits", "robot:FILE" for all skins of a robot.
         mode: "touches", "image", "raw", "events", or several: "touches,image".
         model: a file, where the board's model is not the prebuilt one.
-        frames: stop after so many; 0: go on until the scene or the recording ends.
+        frames: stop after so many of each skin; 0: go on until the scene or the recording ends.
         every: every n-th frame; 0: as many as the line carries.
         tare: take the reference from so many frames of the untouched skin.
         preset: "fast", "balanced" or "accurate": scan and solver by name, as ``--preset``.
         to: sinks, such as "udp://127.0.0.1:9000" (docs/guide/touches-out.md).
-        record: a new recording of every packet.
+        record: a new recording of every packet; of a robot a folder with one per skin.
         zones: a file of named places, whose presses are reported (docs/guide/gestures.md).
         speed: of what is simulated, emulated or recorded; 1 is as it was, 0 as fast as it can.
         name: of the board, skin or source in every message (None: the URL's, else the
@@ -121,20 +121,15 @@ def _stream(
         name=name,
     )
     with (
-        Session(url, settings, speed=speed, observe=observe_scene) as session,
+        open_session(url, settings, speed=speed, observe=observe_scene) as session,
         attached_outputs(session, to) as outputs,
     ):
         yield from _frames(session)
-        outputs.end(session_facts(session))
+        session.finish()
+        outputs.end(session.facts())
 
 
-def session_facts(session: Session) -> dict[str, Any]:
-    """Return the summary of a session, for JSON."""
-    truth = None if session.observer is None else session.observer.facts()
-    return session.finish().as_dict() | {"truth": truth}
-
-
-def _frames(session: Session) -> Iterator[Frame]:
+def _frames(session: AnySession) -> Iterator[Frame]:
     """Frames, each with the notices since the one before."""
     notices: list[Notice] = []
     messages = session.messages()

@@ -18,7 +18,7 @@ from eitskin.cli.device_options import (
 )
 from eitskin.cli.printing import answer, say, say_progress
 from eitskin.session.frame import Frame, Message, Notice
-from eitskin.session.session import Session
+from eitskin.session.robot_session import open_session
 from eitskin.truth import observe_scene
 
 
@@ -29,7 +29,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " read up to its last complete packet. Stop with Ctrl-C."
     )
     add_device(parser)
-    option(parser, "-o --output RUN.eits", None, Output, required=True)
+    where = "the recording; a robot's is a folder with a file per skin"
+    option(parser, "-o --output RUN.eits", where, Output, required=True)
     option(parser, "--overwrite", "overwrite an existing file")
     add_stream(parser, "raw,image,touches")
     seconds = "stop after S seconds of the board's time"
@@ -41,25 +42,22 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     settings = session_settings(options, read_mode(options.mode), record=options.output)
-    with Session(
+    with open_session(
         options.device, settings, say=say, progress=say_progress, observe=observe_scene
     ) as session:
         messages = session.messages()
         try:
-            _show_progress(_until(messages, options.seconds), settings.frames)
+            total = settings.frames * len(session.parts)
+            _show_progress(_until(messages, options.seconds), total)
         except KeyboardInterrupt:
             say("stopped")
         finally:
             messages.close()
-        summary, recorder, source = session.finish(), session.recorder, session.source
-    assert recorder is not None
-    facts = {
-        "recording": str(options.output),
-        "source": source,
-        "packets": recorder.packets,
-        "bytes": recorder.bytes,
-    }
-    written = f"{options.output}: {recorder.packets} packets, {recorder.bytes} bytes"
+        summary, source = session.finish(), session.source
+        recorders = [one.recorder for one in session.parts.values() if one.recorder is not None]
+    packets, size = sum(one.packets for one in recorders), sum(one.bytes for one in recorders)
+    facts = {"recording": str(options.output), "source": source, "packets": packets, "bytes": size}
+    written = f"{options.output}: {packets} packets, {size} bytes"
     return answer(options, facts | summary.as_dict(), *summary.lines(), written)
 
 
@@ -70,9 +68,9 @@ def _until(messages: Iterator[Message], seconds: float | None) -> Iterator[Messa
             return
 
 
-def _show_progress(messages: Iterable[Message], frames: int) -> None:
+def _show_progress(messages: Iterable[Message], total: int) -> None:
     with tqdm(
-        desc="frames", total=frames or None, unit="", leave=False, disable=not sys.stderr.isatty()
+        desc="frames", total=total or None, unit="", leave=False, disable=not sys.stderr.isatty()
     ) as bar:
         for message in messages:
             if isinstance(message, Notice):

@@ -11,9 +11,10 @@ from eitskin.cli.printing import answer, say
 from eitskin.errors import FrameError, UsageError, VerificationError
 from eitskin.fileio import refuse_unwritable
 from eitskin.frames.frames import save_frames
+from eitskin.robot.recorded import FILE
 from eitskin.session.checks.host_check import check_recording
 from eitskin.session.checks.raw_frames import finite_only, frames_of
-from eitskin.session.session import Session
+from eitskin.session.robot_session import open_session
 from eitskin.session.settings import SessionSettings
 from eitskin.truth import observe_scene
 
@@ -24,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " solve them with this host's core, and compare every bit of images and touches with what"
         " the board sent."
     )
-    option(parser, "recording RUN.eits", None, Path)
+    option(parser, "recording RUN.eits", "a recording, or the folder of a robot's", Path)
     option(
         parser, "--mode KIND[,KIND]", "raw, image, touches, events, or several (default: touches)"
     )
@@ -43,6 +44,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     refuse_unwritable(options.picture, options.frames)
     if options.check or options.frames is not None:
+        if options.recording.is_dir():
+            raise UsageError(
+                f"{options.recording}: holds the recordings of a robot; --check and --frames take"
+                " one of its files"
+            )
         shown = (options.mode, options.picture, options.film, options.first)
         if any(one is not None for one in shown):
             raise UsageError(
@@ -60,7 +66,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _show(options: argparse.Namespace) -> None:
     mode = read_mode(options.mode or "touches")
-    check_drawn(options, mode)
+    recording = _url(options.recording)
+    check_drawn(options, mode, recording)
     settings = SessionSettings(
         mode=mode,
         frames=options.first or 0,
@@ -68,9 +75,13 @@ def _show(options: argparse.Namespace) -> None:
         model_for="a picture" if options.picture or options.film else "",
         zones=read_zones(options.zones),
     )
-    recording = f"file:{options.recording}"
-    with Session(recording, settings, say=say, observe=observe_scene) as session:
+    with open_session(recording, settings, say=say, observe=observe_scene) as session:
         show(options, session)
+
+
+def _url(recording: Path) -> str:
+    """The URL of a recording, or of a robot's, which is a folder."""
+    return f"robot:{recording / FILE}" if recording.is_dir() else f"file:{recording}"
 
 
 def _export(options: argparse.Namespace) -> None:

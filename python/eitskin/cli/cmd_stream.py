@@ -19,7 +19,7 @@ from eitskin.cli.device_options import (
 from eitskin.cli.live_output import check_drawn, show
 from eitskin.cli.printing import say, say_progress
 from eitskin.device.wire.link_table import Stream
-from eitskin.session.session import Session
+from eitskin.session.robot_session import open_session
 from eitskin.truth import observe_scene
 
 
@@ -49,9 +49,9 @@ def run(options: argparse.Namespace) -> int:
     drawn = options.picture is not None or options.film is not None
     needs = "an image" if mode & Stream.IMAGE else "a picture" if drawn else ""
     settings = session_settings(options, mode, record=options.record, model_for=needs)
-    check_drawn(options, mode)
+    check_drawn(options, mode, options.device)
     with (
-        Session(
+        open_session(
             options.device, settings, say=say, progress=say_progress, observe=observe_scene
         ) as session,
         named_outputs(options, session) as outputs,

@@ -19,7 +19,9 @@ from eitskin.device.timing import check_name
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import FileError, UsageError
 from eitskin.fileio import refuse_unwritable
-from eitskin.session.session import Session
+from eitskin.robot.description import is_robot
+from eitskin.robot.recorded import check_folder
+from eitskin.session.robot_session import AnySession
 from eitskin.session.settings import SessionSettings, kinds_of
 from eitskin.session.zones import load_zones
 from eitskin.sinks.outputs import Outputs, attached_outputs
@@ -27,8 +29,8 @@ from eitskin.sinks.outputs import Outputs, attached_outputs
 DEVICE_HELP = (
     "auto (the only board that is plugged in), serial:/dev/ttyACM0, text:PORT?layout=FILE (lines of"
     " another instrument), sim:SCENE (simulated), emu:SCENE (the firmware on an emulated board),"
-    " file:RUN.eits (a recording). SCENE is a file or a scene of  eitskin scene list. The last"
-    " three can end in ?speed=1&loop=1"
+    " file:RUN.eits (a recording), robot:FILE (all skins of a robot, docs/guide/robot.md). SCENE is"
+    " a file or a scene of  eitskin scene list. The last four can end in ?speed=1&loop=1"
 )
 MAX_U32 = 2**32 - 1
 
@@ -198,7 +200,9 @@ def add_name(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def named_outputs(options: argparse.Namespace, session: Session) -> AbstractContextManager[Outputs]:
+def named_outputs(
+    options: argparse.Namespace, session: AnySession
+) -> AbstractContextManager[Outputs]:
     """Return a context with the open sinks of ``--to``, attached to ``session``."""
     overwrite = getattr(options, "overwrite", False)
     return attached_outputs(session, options.to or (), overwrite=overwrite, say=say)
@@ -299,7 +303,11 @@ def session_settings(
     every = options.every or 0
     if options.report == "drive" and every > 1:
         raise UsageError(f"--report drive needs every frame; leave out --every {every}")
-    check_recording(record, options.overwrite)
+    robot = is_robot(options.device)
+    if robot and record is not None:
+        check_folder(record, options.overwrite)
+    else:
+        check_recording(record, options.overwrite)
     return SessionSettings(
         mode=mode,
         report=options.report,

@@ -1,7 +1,6 @@
 """Print a board's frames as they arrive, and their summary; shared by ``stream`` and ``replay``."""
 
 import argparse
-from typing import Any
 
 from eitskin.cli.frame_line import line
 from eitskin.cli.printing import say
@@ -9,9 +8,10 @@ from eitskin.cli.progress import bar
 from eitskin.device.wire.link_table import Stream
 from eitskin.errors import EitskinError, UsageError
 from eitskin.fileio import refuse_unwritable
+from eitskin.robot.description import is_robot
 from eitskin.session.frame import DriveReport, Frame, Notice
 from eitskin.session.message import encoded, summary_message
-from eitskin.session.session import Session
+from eitskin.session.robot_session import AnySession
 from eitskin.sinks.outputs import Outputs
 from eitskin.view.film import check_film
 from eitskin.view.panels import check_picture
@@ -21,15 +21,21 @@ HEADER = "  time s  touch    x mm    y mm  radius mm  force N"
 SCORED = "  off mm"
 
 
-def check_drawn(options: argparse.Namespace, what: Stream) -> None:
-    """Check that ``--picture`` and ``--film`` can be drawn, before anything else is done.
+def check_drawn(options: argparse.Namespace, what: Stream, device: str) -> None:
+    """Check that ``--picture`` and ``--film`` can be drawn of ``device``, before anything else is
+    done.
 
     Raises:
-        UsageError: neither images nor touches are streamed, or a name has an unknown format.
+        UsageError: it is a robot, neither images nor touches are streamed, or a name has an unknown
+            format.
         MissingExtraError: matplotlib is not installed.
     """
     if options.picture is None and options.film is None:
         return
+    if is_robot(device):
+        raise UsageError(
+            f"--picture and --film draw one skin, and {device} is a robot; leave them out"
+        )
     refuse_unwritable(options.picture, options.film)
     check_picture(options.picture)
     check_film(options.film)
@@ -42,16 +48,24 @@ def check_drawn(options: argparse.Namespace, what: Stream) -> None:
 
 class Rows:
     """Formats frames as text: with ``verbose`` one line per frame with everything known about it;
-    otherwise touches in a table, one row each, and other frames in brief."""
+    otherwise touches in a table, one row each, and other frames in brief. ``width`` of the skins'
+    names, which begin the lines of a robot; 0: it is one skin."""
 
-    def __init__(self, verbose: bool, scored: bool) -> None:
+    def __init__(self, verbose: bool, scored: bool, width: int = 0) -> None:
         self._verbose, self._scored, self._begun = verbose, scored, False
+        self._width = width
 
     def lines(self, message: Frame | DriveReport) -> list[str]:
         """Return the lines for the next frame, or for touches after a drive."""
+        begun = self._begun
         if isinstance(message, DriveReport):
-            return self.moving(message)
-        return [*self._frame(message), *_happened(message)]
+            lines = self.moving(message)
+        else:
+            lines = [*self._frame(message), *_happened(message)]
+        if not self._width:
+            return lines
+        head = [f"{'skin':{self._width}}  {lines.pop(0)}"] if self._begun and not begun else []
+        return head + [f"{message.source or '':{self._width}}  {line}" for line in lines]
 
     def _frame(self, frame: Frame) -> list[str]:
         if frame.info is None and frame.raw is None:
@@ -96,16 +110,18 @@ def _happened(frame: Frame) -> list[str]:
     return [f"{frame.time_s:8.3f}  {one.text()}" for one in frame.events if one.is_gesture]
 
 
-def show(options: argparse.Namespace, session: Session, outputs: Outputs | None = None) -> None:
+def show(options: argparse.Namespace, session: AnySession, outputs: Outputs | None = None) -> None:
     """Print every message of ``session``, draw ``--picture`` and ``--film``, and print the summary
     with the counts of ``outputs``. Ctrl-C ends it cleanly."""
     album, broken = Album(), None
-    rows = Rows(options.verbose, session.observer is not None)
+    several = session.source is None
+    scored = any(one.observer is not None for one in session.parts.values())
+    rows = Rows(options.verbose, scored, max(map(len, session.parts)) if several else 0)
     messages = session.messages()
     try:
         for message in messages:
             if isinstance(message, Notice):
-                say(message.text)
+                say(f"{message.source}: {message.text}" if several else message.text)
                 continue
             if isinstance(message, Frame) and (options.picture or options.film):
                 album.add(message)
@@ -116,28 +132,31 @@ def show(options: argparse.Namespace, session: Session, outputs: Outputs | None 
         say("stopped")
     except EitskinError as error:
         broken = error
-        session.summary.link = session.device.counters.as_dict()
+        for part in session.parts.values():
+            part.summary.link = part.device.counters.as_dict()
     finally:
         messages.close()  # stops the board before it is asked for its counters
     if broken is None:
         session.finish()
-    if album.count and session.known is not None:
-        board, url, model = session.device.board.board, session.device.transport.url, session.known
+    (one, *_) = session.parts.values()
+    if album.count and one.known is not None:
+        board, url, model = one.device.board.board, one.device.transport.url, one.known.model
         if options.picture is not None:
-            draw_stream(options.picture, model.model, album, title=f"{board} {url}")
+            draw_stream(options.picture, model, album, title=f"{board} {url}")
         if options.film is not None:
-            film_stream(options.film, model.model, album, progress=bar("film"))
+            film_stream(options.film, model, album, progress=bar("film"))
     if session.summary.frames or broken is None:
         _print_summary(options, session, outputs)
     if broken is not None:
         raise broken
 
 
-def _print_summary(options: argparse.Namespace, session: Session, outputs: Outputs | None) -> None:
-    summary, observer = session.summary, session.observer
+def _print_summary(
+    options: argparse.Namespace, session: AnySession, outputs: Outputs | None
+) -> None:
+    summary = session.summary
     drawn = str(options.picture) if options.picture is not None and summary.frames else None
-    facts: dict[str, Any] = summary.as_dict()
-    facts["truth"] = None if observer is None else observer.facts()
+    facts = session.facts()
     if drawn is not None:
         facts["picture"] = drawn
     if outputs is not None:
@@ -148,7 +167,9 @@ def _print_summary(options: argparse.Namespace, session: Session, outputs: Outpu
         print(encoded(summary_message(facts, session.source)))
         return
     lines = summary.lines() + ([] if outputs is None else outputs.lines)
-    lines += [] if observer is None else observer.lines()
+    for name, part in session.parts.items():
+        scores = [] if part.observer is None else part.observer.lines()
+        lines += [f"{name}: {line}" for line in scores] if session.source is None else scores
     if drawn is not None:
         lines.append(f"picture: {drawn}")
     print("\n".join(lines))

@@ -25,6 +25,7 @@ AS_IN = {
     "emu": "emu:two_touch",
     "file": "file:RUN.eits",
     "text": "text:/dev/ttyACM0?layout=FILE",
+    "robot": "robot:FILE.toml",
 }
 SCHEMES = ("auto", *AS_IN)
 MAX_BAUD = 20_000_000
@@ -145,6 +146,11 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
         raise UsageError(
             f"device {url!r}: something must follow the colon, as in serial:/dev/ttyACM0 or"
             " sim:two_touch"
+        )
+    if scheme == "robot":
+        raise UsageError(
+            f"device {url!r}: a robot has several boards; it can be streamed, recorded and viewed;"
+            " for all else name one board of its file"
         )
     if scheme == "text":
         from eitskin.device.text_source import open_text

@@ -1,6 +1,7 @@
 """The messages that a session gives to every consumer: a ``Frame``, a ``DriveReport`` between
 frames, and a ``Notice`` of something else, such as a fault or an event of the link."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
@@ -21,6 +22,7 @@ from eitskin.device.wire.explain import status_text
 from eitskin.device.wire.link_table import DriveTouch
 from eitskin.device.wire.packets import DriveTouches, Fault, RawFrame, Solved
 from eitskin.errors import MissingExtraError
+from eitskin.robot.placement import FlatTouch, PlacedTouch, Placement
 from eitskin.session.message import TrueTouch, frame_table, head, report_table, true_table
 from eitskin.solve.image_touches import touches_in_image
 
@@ -56,7 +58,7 @@ class DriveReport:
         time_us: the instant, by the clock of frames' ``time_us``.
         board_us: the same by the board's own clock.
         packet: as the board sent it.
-        time_unix_s: as a frame's.
+        time_unix_s, placement: as a frame's.
     """
 
     time_us: int
@@ -64,6 +66,7 @@ class DriveReport:
     packet: DriveTouches
     time_unix_s: float | None = None
     source: str | None = None
+    placement: Placement | None = None
 
     def confirmed(self) -> "DriveReport":
         """The same with the touches alone that a whole frame has confirmed."""
@@ -90,11 +93,16 @@ class DriveReport:
         """In the order in which they came: mm, mm/s; their ids are those of frames."""
         return self.packet.touches
 
+    @cached_property
+    def placed(self) -> tuple[PlacedTouch, ...] | None:
+        """The touches in the frame of the skin's link; None where that is not known."""
+        return _placed(self.placement, self.touches)
+
     def message(self) -> dict[str, Any]:
         times = (self.time_s, self.time_unix_s)
         message = report_table(self.frame, self.drive, *times, self.touches)
         message |= {"board_us": self.board_us, "age_us": self.packet.head.age_us}
-        return message | {"source": self.source}
+        return _with_places(message | {"source": self.source}, self.placement, self.placed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +138,7 @@ class Frame:
         errors_mm: how far off the found touches (without them, the image's places) are, by their
             number; false ones are missing. None where the truth is not known.
         notices: what was noticed since the frame before.
+        placement: where the skin is on its robot's link; None: not known.
     """
 
     number: int
@@ -149,6 +158,7 @@ class Frame:
     errors_mm: dict[int, float] | None = None
     notices: tuple[Notice, ...] = ()
     source: str | None = None
+    placement: Placement | None = None
 
     def confirmed(self) -> "Frame":
         """The same with the touches alone that a whole frame has confirmed."""
@@ -235,6 +245,11 @@ class Frame:
         except MissingExtraError:
             return None
 
+    @cached_property
+    def placed(self) -> tuple[PlacedTouch, ...] | None:
+        """The touches in the frame of the skin's link; None where that is not known."""
+        return _placed(self.placement, self.touches)
+
     @property
     def found_mm(self) -> FloatArray | None:
         """Places (k, 2) of the touches, without them those in the image; None where the frame has
@@ -258,6 +273,7 @@ class Frame:
             info=None if self.info is None or self.info.unsolved else self.info.as_dict(),
         )
         message["board_us"], message["source"] = self.board_us, self.source
+        message = _with_places(message, self.placement, self.placed)
         if arrays:
             message |= self._image_facts() | self._raw_facts()
         return message | self._truth_facts(message)
@@ -314,6 +330,21 @@ class Frame:
         axes = import_module("eitskin.view.touch_axes")  # of a later module, as a result's picture
         png: bytes = axes.touches_png(self.known.model, self.touches, self.image, self.true or ())
         return png
+
+
+def _placed(
+    placement: Placement | None, touches: Sequence[FlatTouch]
+) -> tuple[PlacedTouch, ...] | None:
+    return None if placement is None else tuple(map(placement.place, touches))
+
+
+def _with_places(
+    message: dict[str, Any], placement: Placement | None, placed: Sequence[PlacedTouch] | None
+) -> dict[str, Any]:
+    """``message`` with the link, and its touches with where they are in the link's frame."""
+    for touch, place in zip(message["touches"] or (), placed or (), strict=False):
+        touch |= place.as_dict()
+    return message | {"link": None if placement is None else placement.link}
 
 
 Message = Frame | DriveReport | Notice

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
-from typing import NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from eitskin.core.results import Options
 from eitskin.device.bandwidth import carried_every
@@ -28,6 +28,7 @@ from eitskin.device.streaming import LEAVE_S, STOP_S, packet_stream
 from eitskin.device.timing import check_name, check_speed, is_name, split_name, split_timing
 from eitskin.device.transport import Capabilities
 from eitskin.device.wire.link_table import Setting, Stream
+from eitskin.robot.placement import Placement
 from eitskin.session.assemble import Assembler, Clock
 from eitskin.session.frame import DriveReport, Frame, Message, Notice
 from eitskin.session.gestures import StreamGestures
@@ -166,6 +167,17 @@ class Session:
         return self.given_name or self.device.board.serial
 
     @property
+    def placement(self) -> Placement | None:
+        """Where the skin is on its robot's link; None where nobody says it."""
+        link = self.settings.link
+        return None if link is None else Placement(link, self.settings.pose)
+
+    @property
+    def parts(self) -> "dict[str, Session]":
+        """The sessions of a robot's skins by their names; of one device itself alone."""
+        return {self.source: self}
+
+    @property
     def capabilities(self) -> Capabilities:
         """The capabilities of this kind of device."""
         return self.device.transport.capabilities
@@ -212,6 +224,11 @@ class Session:
     def tare(self, frames: int = TARE_FRAMES, *, anyway: bool = False) -> Future[None]:
         """Take the reference again, from frames of the untouched skin, as ``Device.tare``."""
         return self.ask(lambda device: device.tare(frames, anyway=anyway))
+
+    @property
+    def asked(self) -> bool:
+        """Somebody waits for an answer of the board."""
+        return self._requests.waiting
 
     # ---- to be called in ``ask`` ----
 
@@ -364,7 +381,7 @@ class Session:
             if self._novelty.lines(message):
                 yield replace(message, time_s=self._last_s, time_unix_s=now_s, source=self.source)
         elif isinstance(message, DriveReport):
-            yield replace(message, time_unix_s=now_s, source=self.source)
+            yield replace(message, time_unix_s=now_s, source=self.source, placement=self.placement)
         else:
             yield from self._seen_frame(message, now_s)
 
@@ -382,7 +399,7 @@ class Session:
             frame = replace(frame, touches=(), has_touches=False, info=info)
         frame = replace(
             frame, known=self.known, time_unix_s=now_s, arrived_ns=arrived_ns, events=events,
-            source=self.source,
+            source=self.source, placement=self.placement,
         )  # fmt: skip
         yield frame if self.observer is None else self.observer.see(frame)
 
@@ -392,6 +409,11 @@ class Session:
         if self.settings.frames or self.observer is None:
             return False
         return self.observer.over(frame.board_us)
+
+    def facts(self) -> dict[str, Any]:
+        """The summary as it is now, for JSON."""
+        truth = None if self.observer is None else self.observer.facts()
+        return self.summary.as_dict() | {"truth": truth}
 
     def finish(self) -> Summary:
         """The summary, with what the link and the board counted; a board that did not answer when

@@ -24,7 +24,7 @@ DRIVE = (
     "vy_mm_per_s",
     "confirmed",
 )  # empty in the lines of frames
-COLUMNS = (*HEAD, *TOUCH, "found", "refused", "events", *DRIVE)
+COLUMNS = (*HEAD, *TOUCH, "found", "refused", "events", *DRIVE, "source")
 
 
 class CsvSink:
@@ -37,7 +37,7 @@ class CsvSink:
         message = outgoing.message
         if message["type"] not in ("frame", "report"):
             return
-        shared = {name: message.get(name) for name in (*HEAD, "drive", "refused")}
+        shared = {name: message.get(name) for name in (*HEAD, "drive", "refused", "source")}
         if message["type"] == "frame":
             shared["found"] = "; ".join(message["found"])
             shared["events"] = " ".join(event["kind"] for event in message["events"])

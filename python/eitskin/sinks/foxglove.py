@@ -13,12 +13,34 @@ import numpy as np
 from eitskin.errors import SinkError, missing_extra
 from eitskin.session.message import schema
 from eitskin.sinks.ros2_topics import frame_id, topics_of
-from eitskin.sinks.sink import OutgoingMessage, Sink, TouchSource, address, nothing_more
+from eitskin.sinks.sink import OfSkin, OutgoingMessage, Sink, TouchSource, address, nothing_more
 
 USAGE = "foxglove: or foxglove://HOST:PORT"
 PORT = 8765
 BACKLOG = 128  # messages kept for a client that does not read; the oldest are dropped
 TOPICS = {"frame": "/touches", "report": "/reports", "notice": "/notices"}
+
+
+class _Channels:
+    """The channels of a skin."""
+
+    def __init__(self, source: TouchSource, context: Any) -> None:
+        import foxglove
+        from foxglove.channels import RawImageChannel
+
+        self.frame_id, self.model = frame_id(source), source.model
+        described = schema()
+        defined = {"$defs": described["$defs"]}
+        self.of: dict[str, Any] = {
+            name: foxglove.Channel(
+                topics_of(source) + topic,
+                schema={"title": f"eitskin.{name}", **described["$defs"][name], **defined},
+                message_encoding="json",
+                context=context,
+            )
+            for name, topic in TOPICS.items()
+        }
+        self.pictures = RawImageChannel(topics_of(source) + "/image", context=context)
 
 
 class FoxgloveSink:
@@ -32,26 +54,12 @@ class FoxgloveSink:
     def __init__(self, host: str, port: int, source: TouchSource) -> None:
         try:
             import foxglove
-            from foxglove.channels import RawImageChannel
             from foxglove.messages import RawImage, Timestamp
         except ImportError:
             raise missing_extra("foxglove", "foxglove-sdk") from None
-        self._frame_id = frame_id(source)
-        self._image, self._time, self._model = RawImage, Timestamp, source.model
+        self._image, self._time = RawImage, Timestamp
         self._context = context = foxglove.Context()  # closing it closes its channels
-        described = schema()
-        defined = {"$defs": described["$defs"]}
-        channels = {
-            name: foxglove.Channel(
-                topics_of(source) + topic,
-                schema={"title": f"eitskin.{name}", **described["$defs"][name], **defined},
-                message_encoding="json",
-                context=context,
-            )
-            for name, topic in TOPICS.items()
-        }
-        self._channels: dict[str, Any] = channels
-        self._pictures = RawImageChannel(topics_of(source) + "/image", context=context)
+        self._skins = OfSkin(source, lambda one: _Channels(one, context))
         self._server = foxglove.start_server(
             name=f"eitskin {source.name or source.url}",
             host=host,
@@ -65,22 +73,23 @@ class FoxgloveSink:
         return int(self._server.port)
 
     def write(self, outgoing: OutgoingMessage) -> None:
-        channel = self._channels.get(outgoing.message["type"])
-        if channel is None:
+        skin = self._skins.of(outgoing.message)
+        channel = None if skin is None else skin.of.get(outgoing.message["type"])
+        if skin is None or channel is None:
             return
         now = outgoing.time_ns
         channel.log(json.dumps(outgoing.message).encode(), log_time=now)
         if (
             outgoing.frame is not None
             and outgoing.frame.image is not None
-            and self._model is not None
+            and skin.model is not None
         ):
-            picture = np.nan_to_num(self._model.grid.image(outgoing.frame.image)[::-1])
+            picture = np.nan_to_num(skin.model.grid.image(outgoing.frame.image)[::-1])
             height, width = picture.shape
-            self._pictures.log(
+            skin.pictures.log(
                 self._image(
                     timestamp=self._time(now // 10**9, now % 10**9),
-                    frame_id=self._frame_id,
+                    frame_id=skin.frame_id,
                     width=width,
                     height=height,
                     encoding="32FC1",

@@ -13,14 +13,23 @@ from eitskin.config import nearest
 from eitskin.errors import UsageError
 from eitskin.session.frame import Message
 from eitskin.session.message import summary_message
-from eitskin.session.session import Session
-from eitskin.sinks.sink import Dropped, OutgoingMessage, Sink, TouchSource, without_password
+from eitskin.session.robot_session import AnySession
+from eitskin.sinks.sink import (
+    Dropped,
+    OfSkin,
+    OutgoingMessage,
+    Sink,
+    TouchSource,
+    without_password,
+)
 
 ENTRY_POINT_GROUP = "eitskin.sinks"
 ROOM = 64  # frames: more than a second at 48 frames per second
 DRIVES = 16  # reports that may wait per frame of ROOM
 PATIENCE_S = 2.0
 ENDING_S = 3.0  # total for all sinks
+# These schemes take all skins of a robot in one sink; others are opened for each skin.
+OF_ROBOTS = {"udp", "ws", "csv", "mcap", "ros2", "foxglove"}
 
 
 def sinks() -> dict[str, EntryPoint]:
@@ -48,8 +57,39 @@ def open_sink(url: str, source: TouchSource) -> Sink:
             f"--to {url}: {remedy}{' As' if remedy.endswith('?') else ', as'} in"
             " udp://127.0.0.1:9000, tuio://127.0.0.1 or csv:touches.csv"
         )
-    opened: Sink = known[scheme].load()(url, source)
-    return opened
+    opener: Callable[[str, TouchSource], Sink] = known[scheme].load()
+    if source.skins and scheme not in OF_ROBOTS:
+        return SinkPerSkin(url, source, opener)
+    return opener(url, source)
+
+
+class SinkPerSkin:
+    """A sink for each skin of a robot, behind one queue."""
+
+    def __init__(
+        self, url: str, source: TouchSource, opener: Callable[[str, TouchSource], Sink]
+    ) -> None:
+        opened: list[Sink] = []
+
+        def one(skin: TouchSource) -> Sink:
+            opened.append(opener(url, skin))
+            return opened[-1]
+
+        try:
+            self._sinks = OfSkin(source, one)
+        except BaseException:
+            for sink in opened:
+                sink.close()
+            raise
+
+    def write(self, outgoing: OutgoingMessage) -> None:
+        sink = self._sinks.of(outgoing.message)
+        for each in self._sinks.kept.values() if sink is None else (sink,):
+            each.write(outgoing)
+
+    def close(self) -> None:
+        for sink in self._sinks.kept.values():
+            sink.close()
 
 
 class Outputs:
@@ -74,7 +114,9 @@ class Outputs:
         self._patience_s = PATIENCE_S if patient else 0.0
         try:
             for url in urls:
-                self._queues.append(Queue(url, open_sink(url, source), say, room))
+                self._queues.append(
+                    Queue(url, open_sink(url, source), say, room * len(source.each))
+                )
         except BaseException:
             self.close()
             raise
@@ -125,7 +167,7 @@ class Outputs:
 
 @contextmanager
 def attached_outputs(
-    session: Session,
+    session: AnySession,
     urls: Sequence[str],
     *,
     overwrite: bool = False,
@@ -133,13 +175,27 @@ def attached_outputs(
 ) -> Iterator[Outputs]:
     """Open the sinks of ``urls``, and attach them to the open ``session``, so that they get every
     message. Raises the errors of ``Outputs``."""
-    model = None if session.known is None else session.known.model
-    board = session.device.board.board
-    url, name = session.device.transport.url, session.given_name
-    source = TouchSource(url, board, model, overwrite, name, session.source, session.tare)
+    skins = tuple(_touch_source(session, name, overwrite) for name in session.parts)
+    source = skins[0]
+    if session.source is None:
+        source = TouchSource(session.name, overwrite=overwrite, tare=session.tare, skins=skins)
     with Outputs(urls, source, patient=session.patient, say=say) as outputs:
         session.consumers.append(outputs.put)
         yield outputs
+
+
+def _touch_source(session: AnySession, part: str, overwrite: bool) -> TouchSource:
+    one = session.parts[part]
+    return TouchSource(
+        url=one.device.transport.url,
+        board=one.device.board.board,
+        model=None if one.known is None else one.known.model,
+        overwrite=overwrite,
+        name=one.given_name,
+        source=one.source,
+        tare=lambda: session.parts[part].tare(),  # of the session under way then
+        link=None if one.placement is None else one.placement.link,
+    )
 
 
 class Queue:

@@ -115,8 +115,9 @@ class Ros2Sink:
         self._writers: dict[str, Any] = {}
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
-        if source.tare is not None:
-            self._listen(topics_of(source), source.tare)
+        tares = {topics_of(one): one.tare for one in source.each.values() if one.tare is not None}
+        if tares:
+            self._listen(tares)
 
     def write(self, outgoing: OutgoingMessage) -> None:
         for name, kind, table in self._topics.of(outgoing):
@@ -138,27 +139,37 @@ class Ros2Sink:
         on = topic.Topic(self._participant, name, kind, qos=self._quality)
         return pub.DataWriter(self._participant, on, qos=self._quality)
 
-    def _listen(self, prefix: str, tare: Callable[[], "Future[None]"]) -> None:
-        """Take references that the topic or the service asks for, in a thread."""
+    def _listen(self, tares: dict[str, Callable[[], "Future[None]"]]) -> None:
+        """Take references that topics or services ask for, in a thread; ``tares`` by the beginning
+        of the topics."""
         _, sub, topic = self._dds
+        empty = dds_type("std_msgs/msg/Empty", EMPTY)
+        request = dds_type("std_srvs/srv/Trigger_Request", REQUEST)
+        reply = dds_type("std_srvs/srv/Trigger_Response", REPLY)
 
-        def reader(name: str, kind: str, text: str) -> Any:
-            on = topic.Topic(self._participant, name, dds_type(kind, text), qos=self._quality)
+        def reader(name: str, kind: Any) -> Any:
+            on = topic.Topic(self._participant, name, kind, qos=self._quality)
             return sub.DataReader(self._participant, on, qos=self._quality)
 
-        asked = reader(f"rt{prefix}/tare", "std_msgs/msg/Empty", EMPTY)
-        requests = reader(f"rq{prefix}/tareRequest", "std_srvs/srv/Trigger_Request", REQUEST)
-        reply = dds_type("std_srvs/srv/Trigger_Response", REPLY)
-        replies = self._writer(f"rr{prefix}/tareReply", reply)
+        skins = [
+            (
+                tare,
+                reader(f"rt{prefix}/tare", empty),
+                reader(f"rq{prefix}/tareRequest", request),
+                self._writer(f"rr{prefix}/tareReply", reply),
+            )
+            for prefix, tare in tares.items()
+        ]
 
         def serve() -> None:
             while not self._ending.wait(POLL_S):
-                if _valid(asked.take(DEPTH)):
-                    _tared(tare)
-                for one in _valid(requests.take(DEPTH)):
-                    said = _tared(tare)
-                    text = said or "the reference was taken"
-                    replies.write(reply(one.client, one.sequence, said is None, text))
+                for tare, asked, requests, replies in skins:
+                    if _valid(asked.take(DEPTH)):
+                        _tared(tare)
+                    for one in _valid(requests.take(DEPTH)):
+                        said = _tared(tare)
+                        text = said or "the reference was taken"
+                        replies.write(reply(one.client, one.sequence, said is None, text))
 
         self._thread = threading.Thread(target=serve, name="eitskin ros2 tare", daemon=True)
         self._thread.start()

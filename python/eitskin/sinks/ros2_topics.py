@@ -1,29 +1,36 @@
 """Say which ROS 2 messages a frame, a drive's touches or a notice become, and on which topics:
 ``mcap:`` records them and ``ros2:`` publishes them.
 
-Messages that a robot reads are in metres and by REP 103 and 105: contacts, poses and markers have
-the skin's own frame, with x to the right and y up as the skin is seen from above, and z out of it.
+Messages that a robot reads are in metres and by REP 103 and 105: contacts, poses and markers are in
+the frame of the skin's link, where that is known (a robot file or the model of a surface names it).
+Else they are in the skin's own frame, with x to the right and y up as the skin is seen from above,
+and z out of it. The messages in millimetres and the image are always of the skin's own drawing.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
+from itertools import chain
+from types import SimpleNamespace
 from typing import Any
 
+from eitskin.robot.placement import Placement
 from eitskin.sinks import ros2
-from eitskin.sinks.sink import OutgoingMessage, TouchSource, or_nan
+from eitskin.sinks.sink import OfSkin, OutgoingMessage, TouchSource, or_nan
 
 Topic = tuple[str, str, ros2.Table]  # its name, the type of its messages, a message
 CONTACTS, POSES = "eitskin_msgs/msg/ContactArray", "geometry_msgs/msg/PoseArray"
 MARKERS = "visualization_msgs/msg/MarkerArray"
 CYLINDER, DELETE_ALL = 3, 3
 HEIGHT_M = 0.002  # of a marker
+XYZ = "float64 x\nfloat64 y\nfloat64 z\n"
+OWN = Placement("")  # in the skin's own frame
 LIFETIME_NS = 500_000_000  # of markers, after which a stream that ended shows nothing
 COLOUR = (0.9, 0.35, 0.1)
 
 
 def frame_id(source: TouchSource) -> str:
-    """The frame of reference in ROS: the source's name, or skin."""
+    """The skin's own frame of reference in ROS: the source's name, or skin."""
     return source.name or "skin"
 
 
@@ -42,7 +49,12 @@ def definitions() -> dict[str, str]:
 
     return ros2.definitions() | {
         CONTACTS: ros2.whole(
-            text("ContactArray.msg"), {"eitskin_msgs/Contact": text("Contact.msg")}
+            text("ContactArray.msg"),
+            {
+                "eitskin_msgs/Contact": text("Contact.msg"),
+                "geometry_msgs/Point": XYZ,
+                "geometry_msgs/Vector3": XYZ,
+            },
         ),
         POSES: text("PoseArray.msgdef"),
         MARKERS: text("MarkerArray.msgdef"),
@@ -50,10 +62,22 @@ def definitions() -> dict[str, str]:
 
 
 class RosTopics:
-    """The messages of one source. Diagnostics are repeated only when they change."""
+    """The messages of a source, or of all skins of a robot."""
+
+    def __init__(self, source: TouchSource) -> None:
+        self._skins = OfSkin(source, _SkinTopics)
+
+    def of(self, outgoing: OutgoingMessage) -> Iterator[Topic]:
+        skin = self._skins.of(outgoing.message)
+        return iter(()) if skin is None else skin.of(outgoing)
+
+
+class _SkinTopics:
+    """The messages of one skin. Diagnostics are repeated only when they change."""
 
     def __init__(self, source: TouchSource) -> None:
         self._source, self._frame_id, self._prefix = source, frame_id(source), topics_of(source)
+        self._link = source.link or self._frame_id
         self._status: Any = None
 
     def of(self, outgoing: OutgoingMessage) -> Iterator[Topic]:
@@ -61,18 +85,18 @@ class RosTopics:
             yield self._prefix + name, kind, table
 
     def _plain(self, outgoing: OutgoingMessage) -> Iterator[Topic]:
-        message, now, at = outgoing.message, outgoing.time_ns, self._frame_id
+        message, now, at, link = outgoing.message, outgoing.time_ns, self._frame_id, self._link
         if message["type"] == "summary":
             return
         if outgoing.report is not None:
             yield "/reports", "eitskin_msgs/msg/Report", ros2.report(message, now, at)
-            yield "/contacts", CONTACTS, contacts(message, now, at)
+            yield "/contacts", CONTACTS, contacts(message, now, link)
             return
         if outgoing.frame is not None:
             yield "/touches", "eitskin_msgs/msg/TouchArray", ros2.touch_array(message, now, at)
-            yield "/contacts", CONTACTS, contacts(message, now, at)
-            yield "/poses", POSES, poses(message, now, at)
-            yield "/markers", MARKERS, markers(message, now, at)
+            yield "/contacts", CONTACTS, contacts(message, now, link)
+            yield "/poses", POSES, poses(message, now, link)
+            yield "/markers", MARKERS, markers(message, now, link)
             model = self._source.model
             if outgoing.frame.image is not None and model is not None:
                 table = ros2.image(model.grid, outgoing.frame.image, now, at)
@@ -84,8 +108,8 @@ class RosTopics:
 
 
 def contacts(message: ros2.Table, time_ns: int, frame: str) -> ros2.Table:
-    """Return the eitskin_msgs/ContactArray of a frame or a drive, whose touches have neither radius
-    nor force."""
+    """Return the eitskin_msgs/ContactArray of a frame, or of a drive, whose touches have neither
+    confidence nor force."""
     return {
         "header": ros2.header(time_ns, frame),
         "contacts": [_contact(touch) for touch in message["touches"] or []],
@@ -96,49 +120,71 @@ def _contact(touch: ros2.Table) -> ros2.Table:
     def known(name: str, factor: float = 1.0) -> float:
         return or_nan(touch.get(name)) * factor
 
-    mm, mm2 = 1e-3, 1e-6
+    place = placed(touch)
+    velocity = place.get("velocity_m_per_s")
+    covariance = place["covariance_m2"]
     return {
         "id": touch["id"],
-        "x": known("x_mm", mm),
-        "y": known("y_mm", mm),
-        "vx": known("vx_mm_per_s", mm),
-        "vy": known("vy_mm_per_s", mm),
-        "radius": known("radius_mm", mm),
+        "position": _vector(place["position_m"]),
+        "normal": _vector(place["normal"]),
+        "velocity": _vector([math.nan] * 3 if velocity is None else velocity),
+        "radius": known("radius_mm", place["scale"] / 1e3),
         "force": known("force_n"),
         "confidence": known("confidence"),
-        "covariance": [known(name, mm2) for name in ros2.COVARIANCE],
+        "covariance": [math.nan] * 9 if covariance is None else [*chain(*covariance)],
     }
+
+
+def placed(touch: ros2.Table) -> ros2.Table:
+    """Where a touch of a message is in its link's frame; in the skin's own where the message does
+    not say it."""
+    if "position_m" in touch:
+        return touch
+    facts = {name: touch.get(name) for name in ("x_mm", "y_mm", *ros2.COVARIANCE)}
+    moves = {name: touch[name] for name in ("vx_mm_per_s", "vy_mm_per_s") if name in touch}
+    return OWN.place(SimpleNamespace(**facts, **moves)).as_dict()
+
+
+def _vector(numbers: Sequence[float]) -> ros2.Table:
+    return dict(zip("xyz", numbers, strict=True))
 
 
 def poses(message: ros2.Table, time_ns: int, frame: str) -> ros2.Table:
     """Return the geometry_msgs/PoseArray of a frame: the centre of each touch, z out of the
     skin."""
-    found = [_pose(touch, 0.0) for touch in message["touches"] or []]
+    found = [_pose(placed(touch), 0.0) for touch in message["touches"] or []]
     return {"header": ros2.header(time_ns, frame), "poses": found}
 
 
-def _pose(touch: ros2.Table, turn_rad: float) -> ros2.Table:
-    half = turn_rad / 2
+def _pose(place: ros2.Table, turn_rad: float) -> ros2.Table:
+    """A touch's centre, with its frame turned about the normal."""
+    x, y, z, w = place["quaternion_xyzw"]
+    s, c = math.sin(turn_rad / 2), math.cos(turn_rad / 2)
     return {
-        "position": {"x": touch["x_mm"] / 1e3, "y": touch["y_mm"] / 1e3, "z": 0.0},
-        "orientation": {"x": 0.0, "y": 0.0, "z": math.sin(half), "w": math.cos(half)},
-    }
+        "position": _vector(place["position_m"]),
+        "orientation": {
+            "x": x * c + y * s, "y": y * c - x * s, "z": z * c + w * s, "w": w * c - z * s
+        },
+    }  # fmt: skip
 
 
 def markers(message: ros2.Table, time_ns: int, frame: str) -> ros2.Table:
     """Return the visualization_msgs/MarkerArray of a frame: a flat cylinder per touch, in place of
     those of the frame before. An ellipse has its long axis along the marker's x."""
     head = ros2.header(time_ns, frame)
-    found = [_marker(head, DELETE_ALL, 0, _pose({"x_mm": 0.0, "y_mm": 0.0}, 0.0), (1.0, 1.0), 0.0)]
+    nowhere = placed({"x_mm": 0.0, "y_mm": 0.0})
+    found = [_marker(head, DELETE_ALL, 0, _pose(nowhere, 0.0), (1.0, 1.0), 0.0)]
     for touch in message["touches"] or []:
-        radius = touch["radius_mm"] / 1e3
-        along = math.hypot(touch["long_x_mm"] or 0.0, touch["long_y_mm"] or 0.0) / 1e3
+        place = placed(touch)
+        m_per_mm = place["scale"] / 1e3
+        radius = touch["radius_mm"] * m_per_mm
+        along = math.hypot(touch["long_x_mm"] or 0.0, touch["long_y_mm"] or 0.0) * m_per_mm
         turn, size = 0.0, (radius, radius)
         if along > 0:  # the ellipse has the area pi radius^2
             turn = math.atan2(touch["long_y_mm"], touch["long_x_mm"])
             size = (along, radius**2 / along)
         alpha = 0.9 if touch["confidence"] is None else max(0.3, touch["confidence"])
-        found.append(_marker(head, 0, touch["id"], _pose(touch, turn), size, alpha))
+        found.append(_marker(head, 0, touch["id"], _pose(place, turn), size, alpha))
     return {"markers": found}
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 from urllib.parse import SplitResult, parse_qs, urlsplit
 
 from eitskin.config import plain_whole
@@ -29,7 +29,9 @@ class TouchSource:
     """The origin of touches: the device's URL, its board, and its model if the host has it.
     ``overwrite`` allows overwriting existing files. ``name`` is the source's name as given, None
     where none was, and ``source`` the one in messages, which is then the board's serial number.
-    ``tare`` takes the reference again, from any thread; None where there is no board."""
+    ``tare`` takes the reference again, from any thread; None where there is no board. ``link`` is
+    the frame of reference that messages give places in, if there is one. ``skins`` are the sources
+    of a robot, which has neither board nor model itself; empty: it is no robot."""
 
     url: str
     board: str = ""
@@ -38,6 +40,13 @@ class TouchSource:
     name: str | None = None
     source: str | None = None
     tare: Callable[[], "Future[None]"] | None = None
+    link: str | None = None
+    skins: "tuple[TouchSource, ...]" = ()
+
+    @property
+    def each(self) -> "dict[str | None, TouchSource]":
+        """The skins by the source in their messages; of one device itself alone."""
+        return {one.source: one for one in self.skins or (self,)}
 
     @property
     def box_mm(self) -> Box | None:
@@ -72,6 +81,21 @@ class OutgoingMessage:
     def text(self) -> str:
         """The message as a line of JSON."""
         return encoded(self.message)
+
+
+T = TypeVar("T")
+
+
+class OfSkin(Generic[T]):
+    """What a sink keeps for each skin: ``make`` of its source, and ``of`` a message."""
+
+    def __init__(self, source: TouchSource, make: Callable[[TouchSource], T]) -> None:
+        self.kept = {name: make(one) for name, one in source.each.items()}
+        self._only = next(iter(self.kept.values())) if len(self.kept) == 1 else None
+
+    def of(self, message: dict[str, Any]) -> T | None:
+        """What is kept for the skin of ``message``; None for a robot's summary."""
+        return self._only or self.kept.get(message.get("source"))
 
 
 class Sink(Protocol):

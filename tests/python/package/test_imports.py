@@ -30,7 +30,7 @@ ORDER = (
     {"solve"},
     {"calibration"},
     {"device"},
-    {"teaching", "tuning"},
+    {"teaching", "tuning", "robot"},
     {"session"},
     {"bringup"},
     {"scoring"},

@@ -67,10 +67,11 @@ def test_places_are_metres_in_the_skins_frame(store, swipe):
     read = {kind: store.deserialize_cdr(encoded(kind, table), kind) for kind, table in made.items()}
     (contact,) = read[CONTACTS].contacts
     assert contact.id == touch.id and math.isnan(contact.force)
-    assert (contact.x, contact.y) == (touch.x_mm / 1e3, touch.y_mm / 1e3)
+    at = contact.position
+    assert (at.x, at.y, at.z) == (touch.x_mm / 1e3, touch.y_mm / 1e3, 0)
     assert contact.covariance[0] == pytest.approx(touch.x_variance_mm2 * 1e-6)
     (pose,) = read[POSES].poses
-    assert (pose.position.x, pose.position.z, pose.orientation.w) == (contact.x, 0, 1)
+    assert (pose.position.x, pose.position.z, pose.orientation.w) == (at.x, 0, 1)
     clear, marker = read[MARKERS].markers
     assert (clear.action, marker.action, marker.type) == (3, 0, 3)
     assert marker.scale.x * marker.scale.y == pytest.approx(4 * contact.radius**2)

@@ -1,0 +1,1 @@
+"""Robots: which skins they have, and where these are."""
