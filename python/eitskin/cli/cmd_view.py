@@ -27,6 +27,7 @@ from eitskin.errors import FileError, UsageError
 from eitskin.fileio import read_bytes, refuse_unwritable
 from eitskin.page.server import MIN_TOKEN, PageServer, listen, load_server
 from eitskin.page.teacher import Teacher
+from eitskin.robot.description import is_robot
 from eitskin.skin.skin import load_skin
 from eitskin.teaching.plan import load_plan
 
@@ -89,6 +90,10 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError(
             f"--host {options.host}: access from other machines needs a password; set it with"
             f"  --token WORD, at least {MIN_TOKEN} characters"
+        )
+    if options.teach is not None and is_robot(options.device):
+        raise UsageError(
+            f"--teach teaches one skin, and {options.device} is a robot; name the skin's board"
         )
     if not options.folder.is_dir():
         raise FileError(f"--folder {options.folder}: no such folder; make it, or name another")

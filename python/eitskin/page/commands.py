@@ -19,6 +19,7 @@ from eitskin.device.wire.link_table import Stream
 from eitskin.errors import EitskinError, FileError, SkinTouchedError, UsageError
 from eitskin.model.eitm import decode_model
 from eitskin.page.reader import SessionReader
+from eitskin.session.robot_session import AnySession, all_of
 from eitskin.session.session import Session
 from eitskin.session.set_up import take_reference
 from eitskin.session.settings import KINDS
@@ -71,10 +72,9 @@ class PageCommands:
     def tare(self) -> Future[str]:
         """Take the reference. Where something touches the skin, the next tare within ``AGAIN_S``
         takes it all the same."""
-        session = self._board("tare")
         anyway, self._tare_again_s = time.monotonic() < self._tare_again_s, 0.0
 
-        def action(device: Device) -> str:
+        def action(session: Session, device: Device) -> str:
             try:
                 take_reference(device, TARE_FRAMES, streamed=True, anyway=anyway)
             except SkinTouchedError as error:
@@ -84,61 +84,58 @@ class PageCommands:
                 ) from None
             return f"reference taken from {TARE_FRAMES} frames"
 
-        return self._changed(session, action)
+        return self._each(self._board("tare"), action)
 
     def undo_tare(self) -> Future[str]:
         """Bring back the reference before the last tare."""
-        session = self._board("tare")
-        if session.recorder is not None:
+        whole = self._board("tare")
+        if any(one.recorder is not None for one in whole.parts.values()):
             raise UsageError("undo: a recording holds its reference; stop the recording first")
 
-        def action(device: Device) -> str:
+        def action(session: Session, device: Device) -> str:
             device.undo_tare()
             if session.reference is not None:
                 session.reference.undo()
             return "the reference before the last tare is back"
 
-        return self._changed(session, action)
+        return self._each(whole, action)
 
     def mode(self, kinds: list[str]) -> Future[str]:
         """Choose what is streamed."""
-        session = self._reader.live()
         if not kinds or not set(kinds) <= set(KINDS):
             raise UsageError(f"mode: choose from {', '.join(KINDS)}")
         mode = Stream(0)
         for kind in kinds:
             mode |= Stream[kind.upper()]
 
-        def action(device: Device) -> str:
+        def action(session: Session, device: Device) -> str:
             session.change_mode(mode)
             return f"streaming {', '.join(kinds)}"
 
-        return self._changed(session, action)
+        return self._each(self._reader.live(), action)
 
     def solver(self, **changes: Any) -> Future[str]:
-        session = self._board("the solver")
-        named = replace(session.settings.solver, **changes)
 
-        def action(device: Device) -> str:
-            session.change_solver(named)
+        def action(session: Session, device: Device) -> str:
+            session.change_solver(replace(session.settings.solver, **changes))
             return "solver: " + ", ".join(f"{k} {v}" for k, v in changes.items())
 
-        return self._changed(session, action)
+        return self._each(self._board("the solver"), action)
 
     def preset(self, name: str) -> Future[str]:
         """Scan and solver by name, and the reference for them."""
-        session, preset = self._board("a preset"), named_preset(name, "f767")
+        preset = named_preset(name, "f767")
 
-        def action(device: Device) -> str:
+        def action(session: Session, device: Device) -> str:
             session.apply(replace(session.settings, preset=preset))
             take_reference(device, TARE_FRAMES, streamed=True)
             return f"preset {name} is in use, and the reference is taken"
 
-        return self._changed(session, action)
+        return self._each(self._board("a preset"), action)
 
     def upload(self, blob: bytes) -> Future[str]:
         """Another model, and the reference for it."""
-        session = self._board("a model")
+        session = self._one("a model")
         model = decode_model(blob, "the uploaded file")
 
         def action(device: Device) -> str:
@@ -175,7 +172,7 @@ class PageCommands:
 
     def record(self, on: bool) -> Future[str]:
         """Begin or end a recording in the folder."""
-        session, folder = self._board("a recording"), self._reader.folder
+        session, folder = self._one("a recording"), self._reader.folder
 
         def action(device: Device) -> str:
             done = self._end_recording(session)
@@ -222,11 +219,33 @@ class PageCommands:
             what, "paused"
         )
 
-    def _board(self, what: str) -> Session:
+    def _board(self, what: str) -> AnySession:
         session = self._reader.live()
         if session.replays:
             raise UsageError(f"{session.name} is a recording: {what} needs a board")
         return session
+
+    def _one(self, what: str) -> Session:
+        """The session of one skin."""
+        session = self._board(what)
+        if not isinstance(session, Session):
+            raise UsageError(
+                f"{session.name} is a robot: {what} is of one skin here; view that alone, or use"
+                "  eitskin record  for all"
+            )
+        return session
+
+    def _each(self, session: AnySession, action: Callable[[Session, Device], str]) -> Future[str]:
+        """Let ``action`` be carried out for every skin."""
+
+        def of(part: Session) -> Future[str]:
+            return self._changed(part, lambda device: action(part, device))
+
+        if isinstance(session, Session):
+            return of(session)
+        answers = {name: of(part) for name, part in session.parts.items()}
+        session.pacer.wake()
+        return all_of(answers)
 
     def _changed(self, session: Session, action: Callable[[Device], T]) -> Future[T]:
         """Let ``action`` be carried out, and the pages hear of what has changed."""

@@ -28,8 +28,10 @@ import numpy as np
 
 from eitskin import __version__
 from eitskin.device.wire.link_table import Stream
+from eitskin.robot.pose import IDENTITY, Pose
 from eitskin.session.frame import Frame
 from eitskin.session.message import encoded
+from eitskin.session.robot_session import AnySession
 from eitskin.session.session import Session
 from eitskin.session.settings import KINDS
 
@@ -51,24 +53,26 @@ def frame_bytes(number: int, frame: Frame) -> bytes:
     return b"".join((head, pixels, rows, encoded(message).encode()))
 
 
-def setup_text(session: Session, may_command: bool) -> str:
-    """Return the facts that do not change from frame to frame."""
+def setup_text(whole: AnySession, may_command: bool) -> str:
+    """Return the facts that do not change from frame to frame: those of the first skin, and
+    ``skins`` with what differs from skin to skin."""
+    session = next(iter(whole.parts.values()))
     board, how, solver = session.device.board, session.settings, session.solver
     mean_v = None if session.reference is None else session.reference.mean_v
     facts: dict[str, Any] = {
         "eitskin": __version__,
-        "url": session.url,
+        "url": whole.url,
         "board": board.board,
         "serial": board.serial,
-        "name": session.given_name or "",
-        "replays": session.replays,
-        "timed": session.timed,
+        "name": (session.given_name or "") if whole.source else whole.name,
+        "replays": whole.replays,
+        "timed": whole.timed,
         "electrodes": board.n_electrodes,
         "frame_us": board.frame_us,
         "may_command": may_command,
         "mode": [kind for kind in KINDS if session.mode & Stream[kind.upper()]],
-        "speed": session.pacer.speed,
-        "paused": session.pacer.paused,
+        "speed": whole.pacer.speed,
+        "paused": whole.pacer.paused,
         "has_truth": session.observer is not None,
         "can_undo_tare": session.device.can_undo_tare,
         "reference_v": None if mean_v is None else mean_v.tolist(),
@@ -79,8 +83,26 @@ def setup_text(session: Session, may_command: bool) -> str:
         "model_crc": f"{board.model_crc:08x}",
         "zones": [asdict(zone) for zone in how.zones],
         "skin": _skin(session),
+        "skins": [_one(name, part, whole.bases.get(name)) for name, part in whole.parts.items()],
     }
     return text_of("setup", **facts)
+
+
+def _one(name: str, session: Session, base: Pose | None) -> dict[str, Any]:
+    """What differs from skin to skin; ``pose`` and ``link_pose`` are 4 by 4, of the skin's drawing
+    and of its link in the robot's frame."""
+    placement, link = session.placement, base or IDENTITY
+    pose = link if placement is None else link @ placement.pose
+    return {
+        "source": name,
+        "url": session.url,
+        "link": None if placement is None else placement.link,
+        "pose": pose.matrix().tolist(),
+        "link_pose": link.matrix().tolist(),
+        "mode": [kind for kind in KINDS if session.mode & Stream[kind.upper()]],
+        "has_truth": session.observer is not None,
+        "skin": _skin(session),
+    }
 
 
 def _skin(session: Session) -> dict[str, Any] | None:

@@ -1,22 +1,24 @@
 """The pages that are open. A frame goes to each page that has drawn what it got; what a page cannot
-take is dropped and counted, and nobody waits for it."""
+take is dropped and counted, and nobody waits for it. Of each skin the newest frame waits."""
 
 import asyncio
 import time
 from collections import deque
 from dataclasses import dataclass
 
-IN_FLIGHT = 4  # frames that a page may have without having drawn them
+IN_FLIGHT = 4  # frames of each skin that a page may have without having drawn them
 TEXTS = 200  # messages that wait for a page; the oldest go first
 
 
 @dataclass(frozen=True, eq=False)
 class Outgoing:
-    """A frame for the pages: its ``number``, its bytes, when it was complete (monotonic, ns)."""
+    """A frame for the pages: its ``number``, its bytes, when it was complete (monotonic, ns), and
+    the ``source`` that names its skin."""
 
     number: int
     data: bytes
     arrived_ns: int
+    source: str | None = None
 
 
 class PageClient:
@@ -29,14 +31,16 @@ class PageClient:
             maxlen=100
         )  # from complete to drawn, as the page reports
         self._texts: deque[str] = deque(maxlen=TEXTS)
-        self._frame: Outgoing | None = None
+        self._frames: dict[str | None, Outgoing] = {}  # by source, in the order of their turns
+        self._sources: set[str | None] = set()
         self._flying: dict[int, int] = {}
         self._changed = asyncio.Event()
 
     def offer(self, frame: Outgoing) -> None:
-        """The newest frame; one that was not sent yet is dropped for it."""
-        self.dropped += self._frame is not None
-        self._frame = frame
+        """The newest frame of a skin; one that was not sent yet is dropped for it."""
+        self.dropped += frame.source in self._frames
+        self._frames[frame.source] = frame
+        self._sources.add(frame.source)
         self._changed.set()
 
     def tell(self, text: str) -> None:
@@ -58,9 +62,8 @@ class PageClient:
         while True:
             if self._texts:
                 return self._texts.popleft()
-            frame = self._frame
-            if frame is not None and len(self._flying) < IN_FLIGHT:
-                self._frame = None
+            if self._frames and len(self._flying) < IN_FLIGHT * len(self._sources):
+                frame = self._frames.pop(next(iter(self._frames)))
                 self._flying[frame.number] = frame.arrived_ns
                 self.sent += 1
                 return frame.data

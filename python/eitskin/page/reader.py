@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from eitskin.device.link import Reconnect
 from eitskin.device.transport import LinkEvent
 from eitskin.errors import DeviceError
 from eitskin.page.teacher import Teacher
 from eitskin.session.frame import DriveReport, Frame, Message, Notice
+from eitskin.session.robot_session import FOR_EVER, AnySession, open_session
 from eitskin.session.session import Session
 from eitskin.session.settings import SessionSettings
 from eitskin.sinks.outputs import Outputs
@@ -21,8 +21,7 @@ from eitskin.truth import observe_scene
 DRAWN_S = 0.015
 STOPPED_S = 0.8  # that the board may take to stop
 SINKS_S = 4.0  # that the thread may take to end then; sinks have 3 s
-FOR_EVER = Reconnect(tries=2**31, every_s=0.5)
-AttachOutputs = Callable[[Session], AbstractContextManager[Outputs | None]]
+AttachOutputs = Callable[[AnySession], AbstractContextManager[Outputs | None]]
 
 
 class SessionReader:
@@ -51,13 +50,13 @@ class SessionReader:
             teacher.on_event = lambda facts: on_news("teach", facts)
         self._url, self.settings, self._speed, self.folder = url, settings, speed, folder
         self._on_frame, self.report, self._outputs = on_frame, on_news, outputs
-        self.session: Session | None = None  # under way
-        self.last: Session | None = None  # that is over, for pages that come later
-        self._opened: Session | None = None  # perhaps still starting
+        self.session: AnySession | None = None  # under way
+        self.last: AnySession | None = None  # that is over, for pages that come later
+        self._opened: AnySession | None = None  # perhaps still starting
         self.state, self.text = "starting", ""
         self.error: Exception | None = None
         self.frames = 0
-        self._reported_s = 0.0
+        self._reported_s: dict[str | None, float] = {}  # by source
         self._stopping, self._again = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="eitskin view", daemon=True)
 
@@ -82,7 +81,7 @@ class SessionReader:
         """Open the device again, where a session is over."""
         self._again.set()
 
-    def live(self) -> Session:
+    def live(self) -> AnySession:
         """The session under way."""
         session = self.session
         if session is None:
@@ -106,7 +105,7 @@ class SessionReader:
             self._again.wait()
 
     def _read(self) -> None:
-        session = Session(
+        session = open_session(
             self._url,
             self.settings,
             say=self._say,
@@ -118,7 +117,7 @@ class SessionReader:
         self._opened = session
         with session, nullcontext() if self._outputs is None else self._outputs(session):
             session.consumers.append(self._take)
-            if self.teacher is not None:
+            if self.teacher is not None and isinstance(session, Session):
                 self.teacher.begin(session)
                 session.consumers.append(self.teacher.take)
             session.start()
@@ -146,14 +145,17 @@ class SessionReader:
     def _take_report(self, report: DriveReport) -> None:
         """Pass on no more reports than a page draws, but each one without touches, so that a page
         knows when the last finger has gone."""
-        if report.touches and 0 <= report.time_s - self._reported_s < DRAWN_S:
+        before_s = self._reported_s.get(report.source, 0.0)
+        if report.touches and 0 <= report.time_s - before_s < DRAWN_S:
             return
-        self._reported_s = report.time_s
+        self._reported_s[report.source] = report.time_s
         self.report("report", report.message())
 
     def _take_notice(self, notice: Notice) -> None:
         self.report("notice", notice.message())
         kind = notice.cause.kind if isinstance(notice.cause, LinkEvent) else ""
+        if len(self.live().parts) > 1:
+            return  # of a robot, whose other skins go on
         if kind == "unplugged":
             self._set("unplugged", "the board is gone; waiting until it is plugged in again")
         elif kind == "reconnected":

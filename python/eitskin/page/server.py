@@ -9,6 +9,7 @@ import ipaddress
 import json
 import re
 import socket
+import threading
 import time
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
@@ -96,9 +97,9 @@ class PageServer:
         self.host, self.port = host, int(listening.getsockname()[1])
         self._say = say
         self.hub, self._loop = Hub(), asyncio.new_event_loop()
-        self._waiting: Frame | None = None
-        self._newest: Frame | None = None  # for pages that come later
-        self._frames = 0
+        self._waiting: dict[str | None, Frame] = {}  # by source
+        self._newest: dict[str | None, Frame] = {}  # for pages that come later
+        self._frames, self._taking = 0, threading.Lock()
         self.skipped = 0  # frames that came while the one before was not taken up yet
         self.reader = SessionReader(
             url,
@@ -156,12 +157,12 @@ class PageServer:
             self._loop.call_soon_threadsafe(action)
 
     def _frame(self, frame: Frame) -> None:
-        if self._waiting is None:
-            self._waiting = frame
-            self._call(self._send_frame)
-        else:
-            self._waiting = frame
-            self.skipped += 1
+        with self._taking:
+            self.skipped += frame.source in self._waiting
+            first = not self._waiting
+            self._waiting[frame.source] = frame
+        if first:
+            self._call(self._send_frames)
 
     def _news(self, kind: str, facts: dict[str, Any]) -> None:
         failed = kind == "state" and facts["state"] == "failed"
@@ -178,16 +179,21 @@ class PageServer:
 
     # ---- in the loop ----
 
-    def _send_frame(self) -> None:
-        frame, self._waiting = self._waiting, None
-        if frame is None:
-            return
-        self._frames, self._newest = self._frames + 1, frame
-        if self.hub.size:
-            data = frame_bytes(self._frames, frame)
-            self.hub.offer(Outgoing(self._frames, data, frame.arrived_ns))
-        if self._frames == 1:
+    def _send_frames(self) -> None:
+        with self._taking:
+            waiting, self._waiting = self._waiting, {}
+        fresh = not waiting.keys() <= self._newest.keys()
+        self._newest |= waiting
+        for frame in waiting.values():
+            self._frames += 1
+            if self.hub.size:
+                self.hub.offer(self._outgoing(frame, frame.arrived_ns))
+        if fresh:
             self._send_setup()  # the reference is known now
+
+    def _outgoing(self, frame: Frame, arrived_ns: int) -> Outgoing:
+        data = frame_bytes(self._frames, frame)
+        return Outgoing(self._frames, data, arrived_ns, frame.source)
 
     def _send_setup(self) -> None:
         for page in self.hub.pages:
@@ -299,9 +305,8 @@ class PageServer:
         self._tell_setup(page)
         if self.reader.teacher is not None:
             page.tell(text_of("teach", **self.reader.teacher.facts()))
-        if self._newest is not None:
-            data = frame_bytes(self._frames, self._newest)
-            page.offer(Outgoing(self._frames, data, time.monotonic_ns()))
+        for frame in self._newest.values():
+            page.offer(self._outgoing(frame, time.monotonic_ns()))
         tasks = [
             asyncio.create_task(one)
             for one in (self._send(socket, page), self._receive(socket, page), self._about(page))

@@ -21,6 +21,7 @@ from eitskin.device.pacing import Pacer, WallClock
 from eitskin.device.timing import check_speed
 from eitskin.errors import EitskinError, UsageError
 from eitskin.robot.description import Robot, RobotSkin, is_robot, looped, open_robot
+from eitskin.robot.pose import Pose
 from eitskin.robot.recorded import begin_folder, skin_file, write_recorded
 from eitskin.session.frame import DriveReport, Frame, Message, Notice
 from eitskin.session.observer import Observer
@@ -289,8 +290,10 @@ class RobotSession:
         speed: float = 0.0,
         clock: WallClock | None = None,
         observe: Observe = lambda session: None,
+        url: str = "",
     ) -> None:
-        self.robot, self.settings = robot, settings or SessionSettings()
+        self.robot, self.url = robot, url or robot.name
+        self.settings = settings or SessionSettings()
         if self.settings.name is not None:
             raise UsageError(
                 f"name {self.settings.name!r}: the robot's file names its skins; leave the name out"
@@ -340,6 +343,11 @@ class RobotSession:
     @property
     def parts(self) -> dict[str, Session]:
         return {one.skin.name: one.session for one in self._skins}
+
+    @property
+    def bases(self) -> dict[str, Pose]:
+        """Where the links of the skins are in the robot's frame, with all joints at zero."""
+        return {one.name: one.base for one in self.robot.skins}
 
     @property
     def timed(self) -> bool:
@@ -546,4 +554,5 @@ def open_session(
         return Session(url, settings, speed=speed, **how)
     robot, timing = open_robot(url)
     speed = speed if timing.speed is None else timing.speed
-    return RobotSession(looped(robot) if timing.loop else robot, settings, speed=speed, **how)
+    robot = looped(robot) if timing.loop else robot
+    return RobotSession(robot, settings, speed=speed, url=url, **how)

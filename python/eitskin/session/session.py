@@ -29,6 +29,7 @@ from eitskin.device.timing import check_name, check_speed, is_name, split_name, 
 from eitskin.device.transport import Capabilities
 from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.robot.placement import Placement
+from eitskin.robot.pose import Pose
 from eitskin.session.assemble import Assembler, Clock
 from eitskin.session.frame import DriveReport, Frame, Message, Notice
 from eitskin.session.gestures import StreamGestures
@@ -176,6 +177,11 @@ class Session:
     def parts(self) -> "dict[str, Session]":
         """The sessions of a robot's skins by their names; of one device itself alone."""
         return {self.source: self}
+
+    @property
+    def bases(self) -> "dict[str, Pose]":
+        """Where the links of the skins are in the robot's frame; of one device unknown."""
+        return {}
 
     @property
     def capabilities(self) -> Capabilities:

@@ -27,6 +27,7 @@ PAGES = (
     pytest.param("docs/guide/board.md", marks=CLI),
     pytest.param("docs/guide/gestures.md", marks=CLI),
     "docs/guide/touches-out.md",
+    "docs/guide/robot.md",
     pytest.param("docs/guide/your-board.md", marks=CLI),
     pytest.param("docs/reference/python-api.md", marks=API),
     "docs/reference/frames-format.md",
