@@ -116,7 +116,7 @@ static void restart(fw_instrument *instrument)
 int fw_instrument_run(fw_instrument *instrument, const fw_board *board)
 {
     if (board->workspace == NULL || (uintptr_t)board->workspace % 16 != 0 ||
-        board->mclk_hz % 1000000u != 0)
+        board->multiplexers.electrodes > FW_MAX_ELECTRODES)
         return 1;
     fw_instrument_init(instrument, board);
     for (;;) {

@@ -58,36 +58,52 @@ void fw_ad9833_words(uint32_t tuning, uint16_t phase, fw_waveform waveform,
     words[4] = (uint16_t)(CONTROL_B28 | waveform_bits(waveform));
 }
 
-void fw_ad9833_init(fw_ad9833 *generator, fw_spi spi)
-{
-    *generator = (fw_ad9833){.spi = spi, .state = FW_AD9833_UNKNOWN};
-}
-
-fw_status fw_ad9833_stop(fw_ad9833 *generator)
+fw_status fw_ad9833_stop(fw_ad9833 *part)
 {
     const uint16_t word = FW_AD9833_RESET_WORD;
-    const fw_status status = generator->spi.ops->write(generator->spi.ctx, &word, 1);
-    generator->state = status == FW_OK ? FW_AD9833_RESET : FW_AD9833_UNKNOWN;
-    return status;
+    return part->spi.ops->write(part->spi.ctx, &word, 1);
 }
 
-fw_status fw_ad9833_start(fw_ad9833 *generator, uint32_t tuning, uint16_t phase,
-                          fw_waveform waveform)
+fw_status fw_ad9833_start(fw_ad9833 *part, uint32_t tuning, uint16_t phase, fw_waveform waveform)
 {
     uint16_t words[FW_AD9833_WORDS];
     if (tuning >> 28 != 0 || phase >> 12 != 0)
         return FW_E_ARGUMENT;
     fw_ad9833_words(tuning, phase, waveform, words);
-    generator->state = FW_AD9833_UNKNOWN;
     /* one by one: if a write fails, all words before it have been written */
     for (size_t k = 0; k < FW_AD9833_WORDS; ++k) {
-        const fw_status status = generator->spi.ops->write(generator->spi.ctx, &words[k], 1);
+        const fw_status status = part->spi.ops->write(part->spi.ctx, &words[k], 1);
         if (status != FW_OK) {
-            (void)fw_ad9833_stop(generator);
+            (void)fw_ad9833_stop(part);
             return status;
         }
     }
-    generator->state = FW_AD9833_RUNNING;
-    generator->tuning = tuning;
     return FW_OK;
+}
+
+static fw_tone nearest(const void *ctx, uint32_t millihz)
+{
+    const fw_ad9833 *part = ctx;
+    const uint32_t tuning = fw_ad9833_tuning(part->mclk_hz, millihz);
+    return (fw_tone){.millihz = (uint32_t)fw_ad9833_millihertz(part->mclk_hz, tuning),
+                     .turn_per_us = (uint64_t)tuning * (part->mclk_hz / 1000000u) << 36};
+}
+
+static fw_status start(void *ctx, uint32_t millihz)
+{
+    fw_ad9833 *part = ctx;
+    const uint32_t tuning = fw_ad9833_tuning(part->mclk_hz, millihz);
+    return tuning == 0 ? FW_E_RANGE : fw_ad9833_start(part, tuning, 0, FW_SINE);
+}
+
+static fw_status stop(void *ctx)
+{
+    return fw_ad9833_stop(ctx);
+}
+
+fw_generator fw_ad9833_generator(fw_ad9833 *part, fw_spi spi, uint32_t mclk_hz)
+{
+    static const fw_generator_ops ops = {nearest, start, stop};
+    *part = (fw_ad9833){spi, mclk_hz};
+    return (fw_generator){&ops, part};
 }

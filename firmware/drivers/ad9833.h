@@ -36,27 +36,22 @@ uint16_t fw_ad9833_phase(uint32_t millidegrees);
 void fw_ad9833_words(uint32_t tuning, uint16_t phase, fw_waveform waveform,
                      uint16_t words[FW_AD9833_WORDS]);
 
-typedef enum fw_ad9833_state {
-    FW_AD9833_UNKNOWN, /* never written, or both a write and the reset after it failed */
-    FW_AD9833_RESET,   /* output at mid-scale: no current */
-    FW_AD9833_RUNNING
-} fw_ad9833_state;
-
 typedef struct fw_ad9833 {
     fw_spi spi;
-    fw_ad9833_state state;
-    uint32_t tuning;
+    uint32_t mclk_hz;
 } fw_ad9833;
 
-void fw_ad9833_init(fw_ad9833 *generator, fw_spi spi);
+/* The part behind this bus, with this clock, as the application's generator. mclk_hz is a multiple
+ * of 1 MHz, so that the phase advances by whole units in each microsecond. `part` must live as long
+ * as the board. */
+fw_generator fw_ad9833_generator(fw_ad9833 *part, fw_spi spi, uint32_t mclk_hz);
 
 /* Start (or restart) with this tuning word and phase. After an error the part is reset
  * again, if the bus still works. Errors: FW_E_ARGUMENT (more than 28 or 12 bits), those of the
  * bus. */
-fw_status fw_ad9833_start(fw_ad9833 *generator, uint32_t tuning, uint16_t phase,
-                          fw_waveform waveform);
+fw_status fw_ad9833_start(fw_ad9833 *part, uint32_t tuning, uint16_t phase, fw_waveform waveform);
 
-/* Reset the part. Errors: those of the bus; the state is unknown then. */
-fw_status fw_ad9833_stop(fw_ad9833 *generator);
+/* Reset the part: its output stands at mid-scale. Errors: those of the bus. */
+fw_status fw_ad9833_stop(fw_ad9833 *part);
 
 #endif

@@ -42,6 +42,45 @@ typedef struct fw_lines {
     void *ctx;
 } fw_lines;
 
+/* ---- the generator of the excitation, a sine. A driver fills this over the board's bus
+ * (drivers/ad9833.h), or the board does it itself ---- */
+typedef struct fw_tone {
+    uint32_t millihz; /* rounded; 0: the generator cannot make it */
+    /* by which its phase advances, in 2^-64 turns. The demodulator follows the phase by it. */
+    uint64_t turn_per_us;
+} fw_tone;
+typedef struct fw_generator_ops {
+    /* the tone nearest to this frequency that `start` would make */
+    fw_tone (*nearest)(const void *ctx, uint32_t millihz);
+    /* Make that tone, also if another one is on. After an error it is off, if the bus still works.
+     * Errors: FW_E_RANGE (it cannot), those of the bus. */
+    fw_status (*start)(void *ctx, uint32_t millihz);
+    /* No current flows afterwards. Errors: those of the bus; the tone may be on then. */
+    fw_status (*stop)(void *ctx);
+} fw_generator_ops;
+typedef struct fw_generator {
+    const fw_generator_ops *ops;
+    void *ctx;
+} fw_generator;
+
+/* ---- the switches between the electrodes and the instrument's I+, I-, V+ and V-. Filled by a
+ * driver (drivers/adg1206.h) or by the board ---- */
+#define FW_MAX_ELECTRODES 64u /* diagnostics have a bit for each */
+typedef struct fw_multiplexers_ops {
+    /* Connect the electrodes of I+, I-, V+ and V-: 8 bits each, I+ lowest. Each is below
+     * `electrodes` of the fw_multiplexers, and the two of a pair differ. Those that were connected
+     * are disconnected before. Called from the capture's interrupt, so it takes few microseconds.
+     * Errors: those of the lines; all are left disconnected then, if the lines still work. */
+    fw_status (*join)(void *ctx, uint32_t electrodes);
+    /* Disconnect all electrodes. Errors: those of the lines. */
+    fw_status (*all_off)(void *ctx);
+} fw_multiplexers_ops;
+typedef struct fw_multiplexers {
+    const fw_multiplexers_ops *ops;
+    void *ctx;
+    uint32_t electrodes; /* there are, at most FW_MAX_ELECTRODES */
+} fw_multiplexers;
+
 /* ---- sampling: slots of equal length, in each a burst of samples, started by hardware at the
  * slot's start ---- */
 typedef struct fw_capture_setup {
@@ -120,7 +159,7 @@ typedef struct fw_sense {
 
 /* ---- the rest of a board ---- */
 typedef struct fw_system_ops {
-    /* wraps; runs from the clock that the generator's MCLK comes from */
+    /* wraps; runs from the clock that the generator's comes from */
     uint32_t (*time_us)(void *ctx);
     /* returns when an interrupt has come since the last call, or after about 1 ms */
     void (*wait)(void *ctx);
@@ -150,7 +189,6 @@ typedef struct fw_board {
     const char *name;   /* at most 15 characters */
     const char *serial; /* at most 24 characters, hexadecimal */
     uint32_t f_cpu_hz;
-    uint32_t mclk_hz; /* of the generator */
     uint32_t stack_bytes;
     uint32_t frame_period_us; /* of the scan after a start; 0: as fast as possible */
     /* The current of the source as built; 0: none flows. It bounds the excitation from below
@@ -161,9 +199,8 @@ typedef struct fw_board {
     uint32_t source_ua, gain_ppm;
     /* dropped after the current is switched on, while capacitors in its path settle */
     uint32_t settle_frames;
-    fw_spi generator; /* AD9833 */
-    /* lines 0-3 A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V- */
-    fw_lines multiplexers;
+    fw_generator generator;
+    fw_multiplexers multiplexers;
     fw_capture capture;
     fw_link link;
     fw_store store;

@@ -39,7 +39,7 @@ static fw_status spi_write(void *ctx, const uint16_t *words, size_t count)
 double fake_generator_hz(const fake_board *f)
 {
     const double turn = ad9833_model_runs(&f->generator) ? f->generator.tuning : 0;
-    return turn * f->board.mclk_hz / 268435456.0;
+    return turn * FAKE_MCLK_HZ / 268435456.0;
 }
 
 /* Sine of the generator, in turns since it was released; 0 while it is off. */
@@ -68,12 +68,6 @@ static double amplitude_at(const fake_board *f, double at_ns)
     return 0;
 }
 
-static void electrodes_of(const fake_board *f, uint8_t electrodes[4])
-{
-    for (int k = 0; k < 4; ++k)
-        electrodes[k] = (uint8_t)(f->monitor.lines >> (4 * k) & 15u);
-}
-
 static fw_status lines_write(void *ctx, uint32_t mask, uint32_t levels)
 {
     fake_board *f = ctx;
@@ -81,11 +75,9 @@ static fw_status lines_write(void *ctx, uint32_t mask, uint32_t levels)
         return FW_E_BUS;
     record(f, FAKE_LINES, mask, levels);
     drive_monitor_lines(&f->monitor, mask, levels, f->now_ns);
-    const uint32_t after = f->monitor.lines;
     uint8_t electrodes[4];
-    electrodes_of(f, electrodes);
+    const bool all = drive_monitor_joined(f->monitor.lines, electrodes) == 4;
     const double amplitude = amplitude_at(f, (double)f->now_ns);
-    const bool all = (after & 0xF0000u) == 0xF0000u;
     f->event[f->events++ % FAKE_EVENTS] =
         (fake_event){f->now_ns, amplitude,
                      all && f->volts != NULL ? f->volts(f->user, electrodes, f->now_ns) : 0};
@@ -177,7 +169,7 @@ static void interrupt(fake_board *f)
         const double at_ns = (double)f->slot_ns + k * step_ns;
         samples[k] = code_of(f, amplitude_at(f, at_ns) * generator(f, at_ns));
     }
-    electrodes_of(f, f->selected[f->bursts++ % FAKE_ROWS]);
+    (void)drive_monitor_joined(f->monitor.lines, f->selected[f->bursts++ % FAKE_ROWS]);
     fw_burst burst = {
         .samples = samples, .start_us = (uint32_t)(f->slot_ns / 1000u), .lost = f->lose > 0};
     f->slot_ns += (uint64_t)f->setup.slot_us * 1000u;
@@ -407,21 +399,22 @@ void fake_init(fake_board *f, uint32_t start_us)
     f->extra_turn = 0.137;
     memset(f->bank, 0xFF, sizeof f->bank);
     memset(f->page, 0xFF, sizeof f->page);
-    f->board = (fw_board){.name = "fake",
-                          .serial = "00112233445566778899AABB",
-                          .f_cpu_hz = 216000000,
-                          .mclk_hz = 8000000,
-                          .stack_bytes = 8192,
-                          .source_ua_rms = 350,
-                          .generator = {&SPI, f},
-                          .multiplexers = {&LINES, f},
-                          .capture = {&CAPTURE, f, 4095, 3300000, 1000000},
-                          .link = {&LINK, f},
-                          .store = {&STORE, f, FAKE_BANK, FAKE_PAGE},
-                          .system = &SYSTEM,
-                          .system_ctx = f,
-                          .sense = {measure_ua_rms, f},
-                          .workspace = f->workspace,
-                          .workspace_bytes = sizeof f->workspace};
+    f->board =
+        (fw_board){.name = "fake",
+                   .serial = "00112233445566778899AABB",
+                   .f_cpu_hz = 216000000,
+                   .stack_bytes = 8192,
+                   .source_ua_rms = 350,
+                   .generator = fw_ad9833_generator(&f->ad9833, (fw_spi){&SPI, f}, FAKE_MCLK_HZ),
+                   .multiplexers =
+                       fw_adg1206_multiplexers(&f->adg1206, (fw_lines){&LINES, f}, FAKE_ELECTRODES),
+                   .capture = {&CAPTURE, f, 4095, 3300000, 1000000},
+                   .link = {&LINK, f},
+                   .store = {&STORE, f, FAKE_BANK, FAKE_PAGE},
+                   .system = &SYSTEM,
+                   .system_ctx = f,
+                   .sense = {measure_ua_rms, f},
+                   .workspace = f->workspace,
+                   .workspace_bytes = sizeof f->workspace};
     fake_restart(f);
 }

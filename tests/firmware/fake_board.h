@@ -9,6 +9,8 @@
 
 #include "app/instrument.h"
 #include "boards/parts/drive_monitor.h"
+#include "drivers/ad9833.h"
+#include "drivers/adg1206.h"
 
 #include <setjmp.h>
 
@@ -19,6 +21,8 @@
 #define FAKE_WORKSPACE (192 * 1024)
 #define FAKE_ROWS      4096
 #endif
+#define FAKE_MCLK_HZ    8000000u
+#define FAKE_ELECTRODES 16u
 
 enum { FAKE_SPI_LOG = 64, FAKE_EVENTS = 256, FAKE_PAGE = 1024 /* eight records */ };
 
@@ -50,11 +54,13 @@ typedef struct fake_board {
     uint32_t lines_calls, lines_fail_from, lines_fails;
 
     /* generator */
+    fw_ad9833 ad9833;
     ad9833_model generator;
     uint64_t released_ns; /* when its phase began */
     double extra_turn;    /* phase that cables and skin add */
 
     /* multiplexers and skin */
+    fw_adg1206 adg1206;
     drive_monitor monitor; /* has the levels of the lines */
     double (*volts)(void *user, const uint8_t electrodes[4], uint64_t at_ns);
     void *user;

@@ -72,60 +72,69 @@ TEST(test_words)
     CHECK_EQUAL(words[4], 0x2020);
 }
 
-static fw_ad9833 fresh(void)
+/* The part on a board whose log is empty. */
+static fw_generator fresh(fw_ad9833 *part)
 {
-    fw_ad9833 generator;
     fake_init(&board, 0);
     board.log = written;
     board.log_room = FAKE_SPI_LOG;
-    fw_ad9833_init(&generator, board.board.generator);
-    return generator;
+    return fw_ad9833_generator(part, board.ad9833.spi, FAKE_MCLK_HZ);
 }
 
 TEST(test_start)
 {
-    fw_ad9833 generator = fresh();
-    CHECK_EQUAL(generator.state, FW_AD9833_UNKNOWN);
-    CHECK_EQUAL(fw_ad9833_start(&generator, 0x10C7, 0, FW_SINE), FW_OK);
+    fw_ad9833 part;
+    (void)fresh(&part);
+    CHECK_EQUAL(fw_ad9833_start(&part, 0x10C7, 0, FW_SINE), FW_OK);
     const uint16_t note[] = {0x2100, 0x50C7, 0x4000, 0xC000, 0x2000};
     CHECK_EQUAL(board.writes, 5);
     for (uint32_t k = 0; k < 5; ++k) {
         CHECK_EQUAL(written[k].a, note[k]);
         CHECK(k == 0 || written[k].at_ns > written[k - 1].at_ns);
     }
-    CHECK_EQUAL(generator.state, FW_AD9833_RUNNING);
-    CHECK_EQUAL(generator.tuning, 0x10C7);
-    CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 77, FW_SINE), FW_OK);
+    CHECK_EQUAL(fw_ad9833_start(&part, 1677722, 77, FW_SINE), FW_OK);
     CHECK_NEAR(fake_generator_hz(&board), 50000, 0.02);
     CHECK_EQUAL(board.generator.phase, 77);
-    CHECK_EQUAL(fw_ad9833_stop(&generator), FW_OK);
-    CHECK_EQUAL(generator.state, FW_AD9833_RESET);
+    CHECK_EQUAL(fw_ad9833_stop(&part), FW_OK);
     CHECK_NEAR(fake_generator_hz(&board), 0, 0);
-    CHECK_EQUAL(fw_ad9833_start(&generator, 1u << 28, 0, FW_SINE), FW_E_ARGUMENT);
-    CHECK_EQUAL(fw_ad9833_start(&generator, 1, 1u << 12, FW_SINE), FW_E_ARGUMENT);
-    CHECK_EQUAL(generator.state, FW_AD9833_RESET); /* nothing was written */
-    CHECK_EQUAL(board.writes, 11);
+    CHECK_EQUAL(fw_ad9833_start(&part, 1u << 28, 0, FW_SINE), FW_E_ARGUMENT);
+    CHECK_EQUAL(fw_ad9833_start(&part, 1, 1u << 12, FW_SINE), FW_E_ARGUMENT);
+    CHECK_EQUAL(board.writes, 11); /* nothing was written */
+}
+
+TEST(test_as_the_application_sees_it)
+{
+    fw_ad9833 part;
+    const fw_generator generator = fresh(&part);
+    const fw_tone tone = generator.ops->nearest(generator.ctx, 50000000);
+    CHECK_EQUAL(tone.millihz, 50000012);
+    CHECK(tone.turn_per_us == (uint64_t)1677722 * 8u << 36);
+    CHECK_EQUAL(generator.ops->start(generator.ctx, 50000000), FW_OK);
+    CHECK_NEAR(fake_generator_hz(&board), 50000.012, 0.001);
+    CHECK_EQUAL(generator.ops->stop(generator.ctx), FW_OK);
+    CHECK_NEAR(fake_generator_hz(&board), 0, 0);
+    CHECK_EQUAL(generator.ops->nearest(generator.ctx, 4000000001u).millihz, 0); /* above 4 MHz */
+    CHECK_EQUAL(generator.ops->start(generator.ctx, 4000000001u), FW_E_RANGE);
+    CHECK_NEAR(fake_generator_hz(&board), 0, 0);
 }
 
 TEST(test_bus_fails_at_each_word)
 {
     for (uint32_t at = 0; at < FW_AD9833_WORDS; ++at) {
-        fw_ad9833 generator = fresh();
-        CHECK_EQUAL(fw_ad9833_start(&generator, 999, 0, FW_SINE), FW_OK);
+        fw_ad9833 part;
+        (void)fresh(&part);
+        CHECK_EQUAL(fw_ad9833_start(&part, 999, 0, FW_SINE), FW_OK);
         board.spi_fail_from = FW_AD9833_WORDS + at;
         board.spi_fails = 1;
-        CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_E_BUS);
+        CHECK_EQUAL(fw_ad9833_start(&part, 1677722, 0, FW_SINE), FW_E_BUS);
         /* the write after the failure succeeded */
-        CHECK_EQUAL(generator.state, FW_AD9833_RESET);
         CHECK_EQUAL(board.generator.control, 0x2100);
         CHECK_NEAR(fake_generator_hz(&board), 0, 0);
         board.spi_fails = 100; /* from here on every write fails */
-        CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_E_BUS);
-        CHECK_EQUAL(generator.state, FW_AD9833_UNKNOWN);
-        CHECK_EQUAL(fw_ad9833_stop(&generator), FW_E_BUS);
-        CHECK_EQUAL(generator.state, FW_AD9833_UNKNOWN);
+        CHECK_EQUAL(fw_ad9833_start(&part, 1677722, 0, FW_SINE), FW_E_BUS);
+        CHECK_EQUAL(fw_ad9833_stop(&part), FW_E_BUS);
         board.spi_fails = 0;
-        CHECK_EQUAL(fw_ad9833_start(&generator, 1677722, 0, FW_SINE), FW_OK);
+        CHECK_EQUAL(fw_ad9833_start(&part, 1677722, 0, FW_SINE), FW_OK);
         CHECK_NEAR(fake_generator_hz(&board), 50000, 0.02);
     }
 }

@@ -9,7 +9,7 @@
 
 static bool drives(void)
 {
-    return (b.board.monitor.lines & 0xF0000u) != 0 || fake_generator_hz(&b.board) > 0;
+    return (b.board.monitor.lines & DRIVE_MONITOR_ENABLES) != 0 || fake_generator_hz(&b.board) > 0;
 }
 
 /* Start with a host that is heard only by its packets. */

@@ -14,6 +14,20 @@ static fw_demodulator d;
 static const fw_capture CAPTURE = {NULL, NULL, 4095, 3300000, 1000000};
 static uint16_t burst[FW_MAX_SAMPLES];
 
+/* of an AD9833 with 8 MHz */
+static uint64_t turn_per_us(uint32_t tuning)
+{
+    return (uint64_t)tuning * 8u << 36;
+}
+
+/* As after a start: the phase is 0 at time 0. */
+static fw_status set_up(const fw_capture *capture, uint64_t turn, uint32_t excitation_millihz,
+                        uint32_t rate_hz, uint32_t samples)
+{
+    d = (fw_demodulator){0};
+    return fw_demodulate_setup(&d, capture, turn, excitation_millihz, rate_hz, samples);
+}
+
 /* Codes of `amplitude_v` cos(2 pi (turns + hz t)), as a converter rounds them. */
 static void make_burst(uint32_t samples, double rate_hz, double hz, double amplitude_v,
                        double turns, double lsb_v, double middle)
@@ -61,7 +75,7 @@ TEST(test_scale)
     /* 4 periods of 20 samples, 12 of 25 samples, which have only 25 different phases */
     CHECK_NEAR(fw_rounding_v(805664, 50000000, 1000000, 80), 805.664e-6 / sqrt(6 * 20), 1e-10);
     CHECK_NEAR(fw_rounding_v(805664, 40000000, 1000000, 300), 805.664e-6 / sqrt(6 * 25), 1e-10);
-    CHECK_EQUAL(fw_demodulate_setup(&d, &gained, 8000000, 1677722, 50000000, 1000000, 80), FW_OK);
+    CHECK_EQUAL(set_up(&gained, turn_per_us(1677722), 50000000, 1000000, 80), FW_OK);
     make_burst(80, 1e6, 50e3, 0.5, 0, 322.266e-6, 2048);
     fw_iq z;
     CHECK(!fw_demodulate(&d, burst, 0, &z));
@@ -86,8 +100,8 @@ TEST(test_amplitudes)
     for (size_t n = 0; IN_TABLE(n, cases); ++n) {
         CASE(cases[n].name);
         const uint32_t tuning = fw_ad9833_tuning(8000000, cases[n].millihertz);
-        CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, tuning, cases[n].millihertz,
-                                        cases[n].rate, cases[n].samples),
+        CHECK_EQUAL(set_up(&CAPTURE, turn_per_us(tuning), cases[n].millihertz, cases[n].rate,
+                           cases[n].samples),
                     FW_OK);
         for (int k = 0; k < 40; ++k) {
             const double amplitude = k == 0 ? 0 : 1.6 / k, turns = 0.31 * k, middle = 2048 + k % 3;
@@ -106,8 +120,8 @@ TEST(test_amplitudes)
 TEST(test_phase_is_constant)
 {
     const uint32_t tuning = fw_ad9833_tuning(8000000, 50000000);
-    const double turn_per_us = tuning * 8.0 / 268435456.0;
-    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, tuning, 50000000, 1000000, 80), FW_OK);
+    const double turns_per_us = tuning * 8.0 / 268435456.0;
+    CHECK_EQUAL(set_up(&CAPTURE, turn_per_us(tuning), 50000000, 1000000, 80), FW_OK);
     const uint64_t when[] = {0,
                              100,
                              20800,
@@ -120,8 +134,22 @@ TEST(test_phase_is_constant)
         const double turns =
             (double)((unsigned __int128)when[k] * tuning * 8u % 268435456u) / 268435456.0;
         fw_iq z;
-        make_burst(80, 1e6, turn_per_us * 1e6, 1, turns + 0.2, 3.3 / 4096, 2048);
+        make_burst(80, 1e6, turns_per_us * 1e6, 1, turns + 0.2, 3.3 / 4096, 2048);
         CHECK(!fw_demodulate(&d, burst, (uint32_t)when[k], &z));
+        CHECK_NEAR(z.i, cos(TURN * 0.2), 0.3 * 3.3 / 4096);
+        CHECK_NEAR(z.q, sin(TURN * 0.2), 0.3 * 3.3 / 4096);
+    }
+}
+
+/* A generator that makes exactly 50 kHz, a twentieth of a turn in each microsecond, which no number
+ * of bits holds. Its phase at multiples of 20 us is the same when the board's clock wraps. */
+TEST(test_decimal_frequency)
+{
+    CHECK_EQUAL(set_up(&CAPTURE, UINT64_MAX / 20u, 50000000, 1000000, 80), FW_OK);
+    make_burst(80, 1e6, 50e3, 1, 0.2, 3.3 / 4096, 2048);
+    for (uint64_t at_us = 0; at_us < (uint64_t)3 << 32; at_us += 3600000020u) {
+        fw_iq z;
+        CHECK(!fw_demodulate(&d, burst, (uint32_t)at_us, &z));
         CHECK_NEAR(z.i, cos(TURN * 0.2), 0.3 * 3.3 / 4096);
         CHECK_NEAR(z.q, sin(TURN * 0.2), 0.3 * 3.3 / 4096);
     }
@@ -130,7 +158,7 @@ TEST(test_phase_is_constant)
 TEST(test_ends_of_range)
 {
     fw_iq z;
-    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, 1677722, 50000000, 1000000, 80), FW_OK);
+    CHECK_EQUAL(set_up(&CAPTURE, turn_per_us(1677722), 50000000, 1000000, 80), FW_OK);
     for (int k = 0; k < 80; ++k)
         burst[k] = k % 2 ? 1 : 4094;
     CHECK(!fw_demodulate(&d, burst, 0, &z));
@@ -139,19 +167,15 @@ TEST(test_ends_of_range)
     burst[79] = 4094;
     burst[0] = 0;
     CHECK(fw_demodulate(&d, burst, 0, &z));
-    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, 1677722, 50000000, 1000000, 81),
-                FW_E_ARGUMENT);
-    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8000000, 1677722, 50000000, 1000000, 2000),
-                FW_E_ARGUMENT);
-    CHECK_EQUAL(fw_demodulate_setup(&d, &CAPTURE, 8388608, 1677722, 50000000, 1000000, 80),
-                FW_E_ARGUMENT);
+    CHECK_EQUAL(set_up(&CAPTURE, turn_per_us(1677722), 50000000, 1000000, 81), FW_E_ARGUMENT);
+    CHECK_EQUAL(set_up(&CAPTURE, turn_per_us(1677722), 50000000, 1000000, 2000), FW_E_ARGUMENT);
 }
 
 /* The largest sum of 16-bit codes over the longest burst does not overflow. */
 TEST(test_wide_converter)
 {
     const fw_capture wide = {NULL, NULL, 65535, 3300000, 1000000};
-    CHECK_EQUAL(fw_demodulate_setup(&d, &wide, 8000000, 8388608, 250000000, 1000000, 1024), FW_OK);
+    CHECK_EQUAL(set_up(&wide, turn_per_us(8388608), 250000000, 1000000, 1024), FW_OK);
     for (int k = 0; k < 1024; ++k)
         burst[k] = (uint16_t)(k % 4 == 0 ? 65534 : (k % 4 == 2 ? 1 : 32768));
     fw_iq z;

@@ -5,7 +5,15 @@
 #include "app/instrument.h"
 #include "app/safety/current_enable.h"
 
-enum { MS = 1000000, ALL = 0xF0000, ROW = 0x3210, NEXT = 0x4321, FULL = 0x2000, RESET = 0x2100 };
+enum {
+    MS = 1000000,
+    ALL = 0xF0000,
+    OTHERS = 0xF00000,
+    ROW = 0x3210,
+    NEXT = 0x4321,
+    FULL = 0x2000,
+    RESET = 0x2100
+};
 enum { END, HOST, WORD, ADDRESSES, ENABLES, WAIT, LOOK };
 
 typedef struct step {
@@ -39,6 +47,10 @@ static const struct trace {
     {"a multiplexer's address changes before it is open",
      {{HOST, 0}, RUNS, JOIN, {ENABLES, 0}, {WAIT, DRIVE_MONITOR_OPEN_NS - 1}, {ADDRESSES, NEXT}}},
     {"I+ and I- are on the same electrode", {{HOST, 0}, {ADDRESSES, 0x3211}, {ENABLES, ALL}}},
+    {NULL, {{HOST, 0}, {ADDRESSES, 0x3211}, {ENABLES, 0xD0000 | 0x200000}}}, /* electrodes 1, 17 */
+    {"I+ and I- are on the same electrode", {{HOST, 0}, {ADDRESSES, 0x3211}, {ENABLES, OTHERS}}},
+    {"one of I+, I-, V+ and V- is on two electrodes",
+     {{HOST, 0}, {ADDRESSES, ROW}, {ENABLES, ALL | 0x100000}}},
     {"V+ and V- are on the same electrode", {{HOST, 0}, {ADDRESSES, 0x2210}, {ENABLES, ALL}}},
     {"the generator changes while multiplexers are enabled", {{HOST, 0}, RUNS, JOIN, {WORD, FULL}}},
     {"the generator changes while multiplexers are enabled",
@@ -68,7 +80,7 @@ static const char *seen(const step *steps, bool needs_host)
             drive_monitor_lines(&m, 0xFFFF, steps->value, now_ns);
             break;
         case ENABLES:
-            drive_monitor_lines(&m, ALL, steps->value, now_ns);
+            drive_monitor_lines(&m, ALL | OTHERS, steps->value, now_ns);
             break;
         case WAIT:
             now_ns += steps->value;
@@ -125,10 +137,10 @@ static const char *run(fw_lines_ops ops, bool asked, bool heard)
     b.host.quiet = true;
     bench_start(&b, &SKIN_ADJACENT);
     fw_instrument *instrument = &b.host.instrument;
-    sound = *b.board.board.multiplexers.ops;
+    sound = *b.board.adg1206.lines.ops;
     ops.write = ops.write != NULL ? ops.write : sound.write;
     ops.wait_ns = ops.wait_ns != NULL ? ops.wait_ns : sound.wait_ns;
-    b.board.board.multiplexers.ops = &ops;
+    b.board.adg1206.lines.ops = &ops;
     fw_instrument_init(instrument, &b.board.board);
     if (asked)
         drive_monitor_heard(&b.board.monitor, b.board.now_ns);

@@ -20,7 +20,7 @@ TEST(test_no_model)
     CHECK_EQUAL(host_plain(&b.host, EITS_PACKET_SELF_TEST).status, EITS_REPLY_NO_MODEL);
     host_run(&b.host, 3000);
     CHECK_EQUAL(b.board.bursts, 0);
-    CHECK_EQUAL(b.board.monitor.lines & 0xF0000u, 0);
+    CHECK_EQUAL(b.board.monitor.lines & DRIVE_MONITOR_ENABLES, 0);
     CHECK_NEAR(fake_generator_hz(&b.board), 0, 0);
     CHECK((b.board.leds & 4u) != 0);
     skin_model model = skin_model_make(&SKIN_ADJACENT);
@@ -99,13 +99,13 @@ TEST(test_starts_and_ends)
     host_send(&b.host, EITS_PACKET_RESET, &reset, sizeof reset);
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &b.board.board), 2);
     CHECK_EQUAL(b.board.resets, 1);
-    CHECK_EQUAL(b.board.monitor.lines & 0xF0000u, 0);
+    CHECK_EQUAL(b.board.monitor.lines & DRIVE_MONITOR_ENABLES, 0);
     CHECK_NEAR(fake_generator_hz(&b.board), 0, 0);
     fw_board wrong = b.board.board;
     wrong.workspace = b.board.workspace + 4;
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &wrong), 1);
     wrong = b.board.board;
-    wrong.mclk_hz = 8388608;
+    wrong.multiplexers.electrodes = FW_MAX_ELECTRODES + 1;
     CHECK_EQUAL(fw_instrument_run(&b.host.instrument, &wrong), 1);
 }
 

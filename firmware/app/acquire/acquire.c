@@ -10,7 +10,6 @@ void fw_acquire_init(fw_acquire *acquire, const fw_board *board, fw_safety *safe
 {
     *acquire = (fw_acquire){.board = board, .safety = safety, .settings = FW_SCAN_DEFAULT};
     acquire->settings.frame_period_us = board->frame_period_us;
-    fw_ad9833_init(&acquire->generator, board->generator);
     fw_scan_init(&acquire->scan, board, &acquire->demodulator);
 }
 
@@ -57,31 +56,40 @@ fw_status fw_acquire_stop(fw_acquire *acquire)
     return fw_scan_stop(&acquire->scan);
 }
 
-/* At the tuning word that the settings ask for. A generator that has it already is left alone, so
- * that it keeps its phase. */
+/* The tone that the settings ask for. A generator that makes it already is left alone, so that it
+ * keeps its phase. */
 static fw_status start_generator(fw_acquire *acquire, bool *new_phase)
 {
-    fw_ad9833 *generator = &acquire->generator;
-    const uint32_t tuning =
-        fw_ad9833_tuning(acquire->board->mclk_hz, acquire->settings.excitation_millihz);
-    *new_phase = generator->state != FW_AD9833_RUNNING || generator->tuning != tuning;
-    return *new_phase ? fw_ad9833_start(generator, tuning, 0, FW_SINE) : FW_OK;
+    const fw_generator *generator = &acquire->board->generator;
+    const uint32_t wanted_millihz = acquire->settings.excitation_millihz;
+    const fw_tone tone = generator->ops->nearest(generator->ctx, wanted_millihz);
+    *new_phase =
+        acquire->generating != FW_GENERATING_TONE || acquire->tone.turn_per_us != tone.turn_per_us;
+    if (!*new_phase)
+        return FW_OK;
+    const fw_status status = generator->ops->start(generator->ctx, wanted_millihz);
+    acquire->tone = tone;
+    acquire->generating = status == FW_OK ? FW_GENERATING_TONE : FW_GENERATING_UNKNOWN;
+    return status;
 }
 
 static fw_status stop_generator(fw_acquire *acquire)
 {
-    fw_ad9833 *generator = &acquire->generator;
-    return generator->state == FW_AD9833_RESET ? FW_OK : fw_ad9833_stop(generator);
+    const fw_generator *generator = &acquire->board->generator;
+    if (acquire->generating == FW_GENERATING_NOTHING)
+        return FW_OK;
+    const fw_status status = generator->ops->stop(generator->ctx);
+    acquire->generating = status == FW_OK ? FW_GENERATING_NOTHING : FW_GENERATING_UNKNOWN;
+    return status;
 }
 
 static fw_status start_scan(fw_acquire *acquire, const fw_scan_table *table, fw_frame *frames)
 {
-    const fw_board *board = acquire->board;
     const fw_scan_settings *s = &acquire->settings;
     const fw_capture capture = fw_owner_capture(acquire->safety);
-    const fw_status status = fw_demodulate_setup(&acquire->demodulator, &capture, board->mclk_hz,
-                                                 acquire->generator.tuning, s->excitation_millihz,
-                                                 s->sample_rate_hz, s->samples);
+    const fw_status status =
+        fw_demodulate_setup(&acquire->demodulator, &capture, acquire->tone.turn_per_us,
+                            s->excitation_millihz, s->sample_rate_hz, s->samples);
     return status == FW_OK ? fw_scan_start(&acquire->scan, s, table, frames) : status;
 }
 
@@ -109,7 +117,7 @@ fw_started fw_acquire_start(fw_acquire *acquire, fw_status stopped, const fw_sca
 
 fw_status fw_acquire_probe(fw_acquire *acquire, const fw_probe_setup *setup)
 {
-    const bool joins = setup->before != FW_PROBE_OPEN || setup->joined != FW_PROBE_OPEN;
+    const bool joins = setup->before != EITS_PROBE_OPEN || setup->joined != EITS_PROBE_OPEN;
     if (joins && setup->generator && !fw_current_allowed(acquire->safety))
         return FW_E_ARGUMENT;
     bool new_phase;
@@ -143,7 +151,8 @@ bool fw_acquire_retry_due(const fw_acquire *acquire)
 void fw_acquire_shut_down(fw_acquire *acquire)
 {
     (void)fw_acquire_stop(acquire);
-    (void)fw_ad9833_stop(&acquire->generator);
+    acquire->generating = FW_GENERATING_UNKNOWN; /* whatever it is: stop it */
+    (void)stop_generator(acquire);
 }
 
 fw_frame *fw_acquire_take(fw_acquire *acquire)

@@ -51,13 +51,12 @@ static int16_t to_q15(float value)
     return (int16_t)(32767.0f * value + (value < 0 ? -0.5f : 0.5f));
 }
 
-fw_status fw_demodulate_setup(fw_demodulator *d, const fw_capture *capture, uint32_t mclk_hz,
-                              uint32_t tuning, uint32_t excitation_millihz, uint32_t rate_hz,
-                              uint32_t samples)
+fw_status fw_demodulate_setup(fw_demodulator *d, const fw_capture *capture, uint64_t turn_per_us,
+                              uint32_t excitation_millihz, uint32_t rate_hz, uint32_t samples)
 {
     if (samples > FW_MAX_SAMPLES || !fw_whole_periods(excitation_millihz, rate_hz, samples) ||
-        mclk_hz == 0 || mclk_hz % 1000000u != 0 || capture->front_end_gain_ppm == 0 ||
-        capture->full_scale_code == 0 || capture->full_scale_code > UINT16_MAX)
+        capture->front_end_gain_ppm == 0 || capture->full_scale_code == 0 ||
+        capture->full_scale_code > UINT16_MAX)
         return FW_E_ARGUMENT;
     const uint32_t periods =
         (uint32_t)((uint64_t)excitation_millihz * samples / ((uint64_t)rate_hz * 1000u));
@@ -75,14 +74,14 @@ fw_status fw_demodulate_setup(fw_demodulator *d, const fw_capture *capture, uint
         (float)capture->reference_uv / ((float)steps * (float)capture->front_end_gain_ppm);
     d->samples = samples;
     d->full_scale_code = capture->full_scale_code;
-    d->turn_per_us = (uint32_t)((uint64_t)tuning * (mclk_hz / 1000000u) & 0x0FFFFFFFu);
+    d->turn_per_us = turn_per_us;
     d->scale = code_v * 2.0f / ((float)samples * 32767.0f);
     d->bias[0] = sum[0] * (int64_t)(steps / 2);
     d->bias[1] = sum[1] * (int64_t)(steps / 2);
     return FW_OK;
 }
 
-bool fw_demodulate(const fw_demodulator *d, const uint16_t *samples, uint32_t start_us, fw_iq *out)
+bool fw_demodulate(fw_demodulator *d, const uint16_t *samples, uint32_t start_us, fw_iq *out)
 {
     const uint32_t inside =
         d->full_scale_code - 1u; /* number of codes that are not at an end of the range */
@@ -98,7 +97,9 @@ bool fw_demodulate(const fw_demodulator *d, const uint16_t *samples, uint32_t st
      * sin(phase) */
     const float i = d->scale * (float)in_phase, q = -d->scale * (float)quadrature;
     float c, s;
-    fw_sincos(d->turn_per_us * start_us << 4, &c, &s);
+    d->turn += d->turn_per_us * (start_us - d->at_us);
+    d->at_us = start_us;
+    fw_sincos((uint32_t)(d->turn >> 32), &c, &s);
     out->i = i * c + q * s;
     out->q = q * c - i * s;
     return ends != 0;

@@ -1,10 +1,10 @@
 /* Amplitude and phase of the excitation in a burst of converter codes.
  *
  * A burst holds a whole number of excitation periods. So neither the bias nor the image frequency
- * adds to its sums with a cosine and a sine. The generator's frequency is the nearest one that its
- * tuning word can express, and not exactly the nominal one. Within a burst the difference is
- * negligible; from burst to burst it turns the phase. The demodulator therefore computes the phase
- * of the generator's accumulator, in the same wrapping arithmetic, and subtracts it. */
+ * adds to its sums with a cosine and a sine. The generator's frequency is the nearest one that it
+ * can make, and not exactly the nominal one. Within a burst the difference is negligible; from
+ * burst to burst it turns the phase. The demodulator therefore adds up the generator's phase from
+ * burst to burst, in wrapping arithmetic, and subtracts it. */
 #ifndef FW_DEMODULATE_H
 #define FW_DEMODULATE_H
 
@@ -14,8 +14,9 @@
 typedef struct fw_demodulator {
     uint32_t samples;
     uint32_t full_scale_code;
-    uint32_t turn_per_us; /* of the generator, in 2^-28 turns modulo 2^28 */
-    float scale;          /* volts at the electrodes per unit of the sums */
+    uint64_t turn_per_us, turn; /* of the generator, in 2^-64 turns; `turn` at: */
+    uint32_t at_us;             /* the last burst */
+    float scale;                /* volts at the electrodes per unit of the sums */
     /* what a constant at mid-scale adds to the sums; 0 for even numbers of samples */
     int64_t bias[2];
     int16_t cosine[FW_MAX_SAMPLES], sine[FW_MAX_SAMPLES]; /* times 32767 */
@@ -36,15 +37,15 @@ uint32_t fw_volts_per_code_nv(const fw_capture *capture);
 float fw_rounding_v(uint32_t volts_per_code_nv, uint32_t excitation_millihz, uint32_t rate_hz,
                     uint32_t samples);
 
-/* Tables and scale for bursts of `samples` (whole periods). mclk_hz must be a multiple of 1 MHz.
- * Errors: FW_E_ARGUMENT. */
+/* Tables and scale for bursts of `samples` (whole periods). The phase goes on. Errors:
+ * FW_E_ARGUMENT. */
 fw_status fw_demodulate_setup(fw_demodulator *demodulator, const fw_capture *capture,
-                              uint32_t mclk_hz, uint32_t tuning, uint32_t excitation_millihz,
-                              uint32_t rate_hz, uint32_t samples);
+                              uint64_t turn_per_us, uint32_t excitation_millihz, uint32_t rate_hz,
+                              uint32_t samples);
 
-/* Demodulate one burst that began at start_us. Returns whether a sample lay at either end of the
- * converter's range. */
-bool fw_demodulate(const fw_demodulator *demodulator, const uint16_t *samples, uint32_t start_us,
+/* Demodulate one burst that began at start_us, less than 2^32 us after the last one. Returns
+ * whether a sample lay at either end of the converter's range. */
+bool fw_demodulate(fw_demodulator *demodulator, const uint16_t *samples, uint32_t start_us,
                    fw_iq *out);
 
 #endif

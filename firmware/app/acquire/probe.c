@@ -2,15 +2,17 @@
 
 #include "app/acquire/scan.h"
 #include "app/clock.h"
+#include "eitskin/link.h"
 
 #include <string.h>
 
 enum { IDLE, FIRST, SECOND, DONE };
 
-static fw_status join(const fw_probe *probe, uint32_t addresses)
+static fw_status join(const fw_probe *probe, uint32_t electrodes)
 {
-    return addresses == FW_PROBE_OPEN ? fw_adg1206_all_off(&probe->mux)
-                                      : fw_adg1206_join(&probe->mux, addresses);
+    const fw_multiplexers *multiplexers = &probe->board->multiplexers;
+    return electrodes == EITS_PROBE_OPEN ? multiplexers->ops->all_off(multiplexers->ctx)
+                                         : multiplexers->ops->join(multiplexers->ctx, electrodes);
 }
 
 /* Called from the capture's interrupt. */
@@ -38,7 +40,6 @@ fw_status fw_probe_start(fw_probe *probe, const fw_board *board, const fw_probe_
                                      fw_burst_us(s) + s->settle_us + FW_SWITCH_US};
     probe->board = board;
     probe->setup = *setup;
-    probe->mux = (fw_adg1206){board->multiplexers};
     fw_status status = ops->configure(board->capture.ctx, &bursts, probe_burst, probe);
     if (status == FW_OK)
         status = join(probe, setup->before);
@@ -57,7 +58,7 @@ void fw_probe_stop(fw_probe *probe)
         return;
     probe->board->capture.ops->stop(probe->board->capture.ctx);
     probe->state = IDLE;
-    (void)fw_adg1206_all_off(&probe->mux);
+    (void)join(probe, EITS_PROBE_OPEN);
 }
 
 bool fw_probe_active(const fw_probe *probe)

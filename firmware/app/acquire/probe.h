@@ -5,19 +5,17 @@
 #define FW_PROBE_H
 
 #include "app/acquire/frame.h"
-#include "drivers/adg1206.h"
 #include "hal/hal.h"
 
 typedef struct fw_probe_setup {
     fw_scan_settings settings; /* rate, samples, settling */
-    uint32_t before, joined;   /* address lines of the multiplexers, or FW_PROBE_OPEN */
-    bool generator;            /* it runs; otherwise it is in reset */
+    /* electrodes as fw_multiplexers_ops takes them, which the board can join; EITS_PROBE_OPEN */
+    uint32_t before, joined;
+    bool generator; /* it runs; otherwise it is stopped */
 } fw_probe_setup;
-#define FW_PROBE_OPEN 0xFFFFFFFFu
 
 typedef struct fw_probe {
     fw_probe_setup setup;
-    fw_adg1206 mux;
     const fw_board *board;
     volatile uint32_t state;
     uint32_t began_us;

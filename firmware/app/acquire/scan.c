@@ -3,9 +3,32 @@
 #include "app/clock.h"
 #include "eitskin/link.h"
 
-void fw_scan_init(fw_scan *scan, const fw_board *board, const fw_demodulator *demodulator)
+void fw_scan_init(fw_scan *scan, const fw_board *board, fw_demodulator *demodulator)
 {
-    *scan = (fw_scan){.board = board, .demodulator = demodulator, .mux = {board->multiplexers}};
+    *scan = (fw_scan){.board = board, .demodulator = demodulator};
+}
+
+bool fw_can_join(const fw_board *board, uint32_t electrodes)
+{
+    uint32_t four[4];
+    for (uint32_t k = 0; k < 4; ++k) {
+        four[k] = electrodes >> 8 * k & 0xFFu;
+        if (four[k] >= board->multiplexers.electrodes)
+            return false;
+    }
+    return four[0] != four[1] && four[2] != four[3];
+}
+
+static fw_status join(const fw_scan *scan, uint32_t electrodes)
+{
+    const fw_multiplexers *multiplexers = &scan->board->multiplexers;
+    return multiplexers->ops->join(multiplexers->ctx, electrodes);
+}
+
+static fw_status all_off(const fw_scan *scan)
+{
+    const fw_multiplexers *multiplexers = &scan->board->multiplexers;
+    return multiplexers->ops->all_off(multiplexers->ctx);
 }
 
 uint32_t fw_burst_us(const fw_scan_settings *s)
@@ -63,7 +86,10 @@ static fw_scan_row find_row(const fw_scan *scan, bool full, uint32_t position)
     fw_scan_row found = {.position = position, .row = row_at(scan, full, position)};
     found.last = position + 1 == rows;
     found.ends_drive = found.last || !same_drive(scan, found.row, row_at(scan, full, position + 1));
-    found.valid = fw_adg1206_addresses(electrodes_of(scan, found.row), &found.addresses) == FW_OK;
+    const uint8_t *four = electrodes_of(scan, found.row);
+    found.electrodes =
+        four[0] | (uint32_t)four[1] << 8 | (uint32_t)four[2] << 16 | (uint32_t)four[3] << 24;
+    found.valid = fw_can_join(scan->board, found.electrodes);
     return found;
 }
 
@@ -84,7 +110,7 @@ static void prepare(fw_scan *scan)
 /* Select a row; `switched` says whether that worked. */
 static void switch_to(fw_scan *scan, const fw_scan_row *row)
 {
-    scan->switched = row->valid && fw_adg1206_join(&scan->mux, row->addresses) == FW_OK;
+    scan->switched = row->valid && join(scan, row->electrodes) == FW_OK;
     scan->switched_us = fw_now_us(scan->board);
 }
 
@@ -246,7 +272,7 @@ fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const f
     status = scan->switched ? capture->ops->start(capture->ctx) : FW_E_BUS;
     scan->running = status == FW_OK;
     if (!scan->running)
-        (void)fw_adg1206_all_off(&scan->mux);
+        (void)all_off(scan);
     return status;
 }
 
@@ -257,7 +283,7 @@ fw_status fw_scan_stop(fw_scan *scan)
     scan->running = false;
     atomic_store(&scan->filled, 0);
     atomic_store(&scan->taken, 0);
-    return fw_adg1206_all_off(&scan->mux);
+    return all_off(scan);
 }
 
 fw_frame *fw_scan_take(fw_scan *scan)

@@ -9,7 +9,6 @@
 
 #include "app/acquire/demodulate.h"
 #include "app/acquire/frame.h"
-#include "drivers/adg1206.h"
 #include "hal/hal.h"
 
 #include <stdatomic.h>
@@ -23,8 +22,8 @@
 
 /* The row that the scan measures in a slot, and how. */
 typedef struct fw_scan_row {
-    uint32_t addresses; /* of the multiplexers, if `valid` */
-    uint32_t position;  /* in the list of rows */
+    uint32_t electrodes; /* as fw_multiplexers_ops takes them, if `valid` */
+    uint32_t position;   /* in the list of rows */
     uint32_t row;
     bool valid, last; /* row of its frame */
     bool ends_drive;  /* the next row has another drive, or is of the next frame */
@@ -32,8 +31,7 @@ typedef struct fw_scan_row {
 
 typedef struct fw_scan {
     const fw_board *board;
-    const fw_demodulator *demodulator;
-    fw_adg1206 mux;
+    fw_demodulator *demodulator;
     fw_scan_table table;
     fw_scan_settings settings;
     uint32_t slot_us, burst_us;
@@ -61,7 +59,10 @@ typedef struct fw_scan {
     _Atomic uint32_t drives, drives_taken;
 } fw_scan;
 
-void fw_scan_init(fw_scan *scan, const fw_board *board, const fw_demodulator *demodulator);
+void fw_scan_init(fw_scan *scan, const fw_board *board, fw_demodulator *demodulator);
+
+/* Whether the board can join these electrodes: I+, I-, V+, V- of 8 bits each, I+ lowest. */
+bool fw_can_join(const fw_board *board, uint32_t electrodes);
 
 /* Length of a burst, and of a slot. A slot holds burst, settling and switching. If that makes it at
  * most a quarter longer, it is rounded up to a whole number of excitation periods. */

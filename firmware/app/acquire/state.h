@@ -6,12 +6,18 @@
 #include "app/acquire/frame.h"
 #include "app/acquire/probe.h"
 #include "app/acquire/scan.h"
-#include "drivers/ad9833.h"
+
+typedef enum fw_generating {
+    FW_GENERATING_UNKNOWN, /* never started or stopped, or the last attempt failed */
+    FW_GENERATING_NOTHING,
+    FW_GENERATING_TONE
+} fw_generating;
 
 struct fw_acquire {
     const fw_board *board;
     struct fw_safety *safety;
-    fw_ad9833 generator;
+    fw_generating generating;
+    fw_tone tone; /* the last that was started */
     fw_demodulator demodulator;
     fw_scan_settings settings;
     fw_scan scan;

@@ -151,7 +151,8 @@ static fw_answer check_scan(const fw_host_link *link, const eits_command_scan *c
     if (c->excitation_millihz >= half_rate_millihz) /* more than two samples per period */
         return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
                          (int32_t)(half_rate_millihz - 1));
-    if (fw_ad9833_tuning(link->board->mclk_hz, c->excitation_millihz) == 0)
+    const fw_generator *generator = &link->board->generator;
+    if (generator->ops->nearest(generator->ctx, c->excitation_millihz).millihz == 0)
         return fw_refuse(EITS_REPLY_RANGE, (int32_t)offsetof(eits_command_scan, excitation_millihz),
                          (int32_t)fw_current_min_millihz(link->safety));
     if (!fw_whole_periods(c->excitation_millihz, c->sample_rate_hz, c->samples))
@@ -403,13 +404,9 @@ static fw_answer on_get_hashes(fw_host_link *link, const void *payload, size_t s
     return (fw_answer){.later = true};
 }
 
-/* The address lines of four electrodes of 8 bits each, I+ lowest; false: no such electrodes. */
-static bool electrodes_to_lines(uint32_t electrodes, uint32_t *lines)
+static bool can_probe(const fw_board *board, uint32_t electrodes)
 {
-    const uint8_t four[4] = {(uint8_t)electrodes, (uint8_t)(electrodes >> 8),
-                             (uint8_t)(electrodes >> 16), (uint8_t)(electrodes >> 24)};
-    *lines = FW_PROBE_OPEN;
-    return electrodes == EITS_PROBE_OPEN || fw_adg1206_addresses(four, lines) == FW_OK;
+    return electrodes == EITS_PROBE_OPEN || fw_can_join(board, electrodes);
 }
 
 static fw_answer on_probe(fw_host_link *link, const void *payload, size_t size)
@@ -419,11 +416,14 @@ static fw_answer on_probe(fw_host_link *link, const void *payload, size_t size)
     (void)size;
     memcpy(&c, payload, sizeof c);
     fw_probe_setup setup = {.settings = *fw_acquire_settings(link->acquire),
+                            .before = c.before,
+                            .joined = c.joined,
                             .generator = c.generator != 0};
-    if (!electrodes_to_lines(c.before, &setup.before))
-        return fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_probe, before), FW_ELECTRODES);
-    if (!electrodes_to_lines(c.joined, &setup.joined))
-        return fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_probe, joined), FW_ELECTRODES);
+    const int32_t electrodes = (int32_t)link->board->multiplexers.electrodes;
+    if (!can_probe(link->board, c.before))
+        return fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_probe, before), electrodes);
+    if (!can_probe(link->board, c.joined))
+        return fw_refuse(EITS_REPLY_RANGE, offsetof(eits_command_probe, joined), electrodes);
     if (outside(&bad, offsetof(eits_command_probe, settle_us), c.settle_us, 0, MAX_SETTLE_US) ||
         outside(&bad, offsetof(eits_command_probe, samples), c.samples, MIN_SAMPLES,
                 FW_MAX_SAMPLES) ||

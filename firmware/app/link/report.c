@@ -11,7 +11,6 @@
 #include "app/solve/solve.h"
 #include "app/solve/store.h"
 #include "app/solve/tare.h"
-#include "drivers/ad9833.h"
 
 enum { NO_BUTTON = 2 };
 
@@ -46,12 +45,13 @@ static void report_scan(const fw_host_link *link, eits_packet_info *info)
 {
     const fw_board *board = link->board;
     const fw_scan_settings *s = fw_acquire_settings(link->acquire);
-    const uint32_t tuning = fw_ad9833_tuning(board->mclk_hz, s->excitation_millihz);
+    const fw_generator *generator = &board->generator;
     info->check_every = (uint16_t)s->check_every;
     info->frame_period_us = s->frame_period_us;
     if (board->frames_given)
         return;
-    info->excitation_millihz = (uint32_t)fw_ad9833_millihertz(board->mclk_hz, tuning);
+    info->excitation_millihz =
+        generator->ops->nearest(generator->ctx, s->excitation_millihz).millihz;
     info->sample_rate_hz = s->sample_rate_hz;
     info->samples = (uint16_t)s->samples;
     info->settle_us = (uint16_t)s->settle_us;
@@ -72,7 +72,7 @@ void fw_send_info(fw_host_link *link, uint32_t request)
     eits_packet_info info = {.request = request,
                              .firmware = {FW_VERSION_MAJOR, FW_VERSION_MINOR, FW_VERSION_PATCH, 0},
                              .f_cpu_hz = board->f_cpu_hz,
-                             .electrodes = FW_ELECTRODES,
+                             .electrodes = board->multiplexers.electrodes,
                              .bank_bytes = fw_store_room(&board->store),
                              .data_bytes = FW_DATA_BYTES,
                              .streaming = link->stream.what,

@@ -29,12 +29,13 @@ static bool of_electrode(eits_fault code)
 
 static uint32_t place_of(eits_fault code, fw_fault_detail detail)
 {
-    return of_electrode(code) ? (uint32_t)detail.index & 31u : 0;
+    return of_electrode(code) ? (uint32_t)detail.index % FW_MAX_ELECTRODES : 0;
 }
 
-static uint32_t with_bit(uint32_t bits, uint32_t place, bool set)
+static uint64_t with_bit(uint64_t bits, uint32_t place, bool set)
 {
-    return set ? bits | 1u << place : bits & ~(1u << place);
+    const uint64_t bit = (uint64_t)1 << place;
+    return set ? bits | bit : bits & ~bit;
 }
 
 void fw_fault_set(fw_safety *safety, eits_fault code, bool there, fw_fault_detail detail)
@@ -45,7 +46,7 @@ void fw_fault_set(fw_safety *safety, eits_fault code, bool there, fw_fault_detai
     if (((faults->there[code] >> place & 1u) != 0) == there)
         return;
     faults->there[code] = with_bit(faults->there[code], place, there);
-    faults->raised = with_bit(faults->raised, code, faults->there[code] != 0);
+    faults->raised = (uint32_t)with_bit(faults->raised, code, faults->there[code] != 0);
     report(safety, code, there, detail);
 }
 
@@ -69,7 +70,7 @@ uint32_t fw_faults_raised(const fw_safety *safety)
 void fw_faults_clear(fw_safety *safety)
 {
     for (uint32_t code = 1; code < EITS_FAULTS; ++code) {
-        for (int32_t k = 0; k < 32; ++k)
+        for (int32_t k = 0; k < (int32_t)FW_MAX_ELECTRODES; ++k)
             fw_fault_set(safety, (eits_fault)code, false, (fw_fault_detail){.index = k});
     }
 }

@@ -9,9 +9,9 @@
 typedef struct fw_faults {
     uint32_t frame;              /* number of the frame that is processed, or was last */
     uint32_t raised;             /* bit k: fault number k */
-    uint32_t there[EITS_FAULTS]; /* bit e: of electrode e; bit 0 for faults of no electrode */
+    uint64_t there[EITS_FAULTS]; /* bit e: of electrode e; bit 0 for faults of no electrode */
     /* consecutive frames that contradict `there`, by the same bits */
-    uint8_t run[EITS_FAULTS][32];
+    uint8_t run[EITS_FAULTS][FW_MAX_ELECTRODES];
 } fw_faults;
 
 typedef struct fw_current {

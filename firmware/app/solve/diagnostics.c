@@ -1,12 +1,12 @@
 #include "app/solve/diagnostics.h"
 
 #include "app/safety/faults.h"
-#include "drivers/adg1206.h"
+#include "hal/hal.h"
 
 static void report_electrodes(fw_safety *safety, eits_fault code, uint64_t which,
                               fw_fault_detail detail)
 {
-    for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
+    for (uint32_t e = 0; e < FW_MAX_ELECTRODES; ++e) {
         detail.index = (int32_t)e;
         fw_fault_observe(safety, code, (which >> e & 1u) != 0, detail);
     }
@@ -32,7 +32,7 @@ static int32_t partner(uint64_t which, uint32_t e)
 static void report_bridged(fw_safety *safety, uint64_t bridged)
 {
     const uint32_t words[5] = {(uint32_t)bridged, (uint32_t)(bridged >> 32)};
-    for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
+    for (uint32_t e = 0; e < FW_MAX_ELECTRODES; ++e) {
         const bool is = (bridged >> e & 1u) != 0;
         const int32_t other = is ? partner(bridged, e) : 0;
         fw_fault_observe(safety, EITS_FAULT_BRIDGED, is,

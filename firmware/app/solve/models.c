@@ -4,7 +4,6 @@
 #include "app/safety/faults.h"
 #include "app/solve/solve.h"
 #include "app/solve/state.h"
-#include "drivers/adg1206.h"
 
 static eits_reply_status refuse(eits_reply_status why, size_t a, size_t b, int32_t detail[2])
 {
@@ -14,13 +13,14 @@ static eits_reply_status refuse(eits_reply_status why, size_t a, size_t b, int32
 }
 
 /* Whether a model can be scanned here, and whether its packets and its memory fit. */
-static eits_reply_status fits(const fw_engine *engine, const eits_model *model, int32_t detail[2])
+static eits_reply_status fits(const fw_solve *solve, const eits_model *model, int32_t detail[2])
 {
     const size_t raw = sizeof(eits_packet_raw) + 5 * (size_t)model->n_rows;
     const size_t image = sizeof(eits_packet_solved) + 4 * (size_t)model->n_pixels;
-    const size_t memory = engine->workspace_bytes, needs = fw_engine_needs(model);
-    if (model->n_electrodes > FW_ELECTRODES)
-        return refuse(EITS_REPLY_MODEL_SCAN, model->n_electrodes, FW_ELECTRODES, detail);
+    const size_t memory = solve->engine.workspace_bytes, needs = fw_engine_needs(model);
+    const uint32_t electrodes = solve->board->multiplexers.electrodes;
+    if (model->n_electrodes > electrodes)
+        return refuse(EITS_REPLY_MODEL_SCAN, model->n_electrodes, electrodes, detail);
     if (raw > EITS_LINK_MAX_PAYLOAD || image > EITS_LINK_MAX_PAYLOAD)
         return refuse(EITS_REPLY_MODEL_SIZE, EITS_LINK_MAX_PAYLOAD, raw > image ? raw : image,
                       detail);
@@ -45,7 +45,7 @@ static eits_status open_bank(fw_solve *solve, uint32_t bank)
         return EITS_E_MODEL_MAGIC;
     eits_status status = fw_store_open(store, bank, record, &model);
     if (status == EITS_OK) {
-        const eits_reply_status fit = fits(&solve->engine, &model, detail);
+        const eits_reply_status fit = fits(solve, &model, detail);
         if (fit != EITS_REPLY_OK)
             status = fit == EITS_REPLY_MODEL_SCAN ? EITS_E_MODEL_VALUE : EITS_E_WORKSPACE;
     }
@@ -103,7 +103,7 @@ eits_reply_status fw_models_try(fw_solve *solve, uint32_t bank, uint32_t size, u
         detail[0] = (int32_t)status;
         return EITS_REPLY_MODEL_INVALID;
     }
-    const eits_reply_status fit = fits(&solve->engine, &model, detail);
+    const eits_reply_status fit = fits(solve, &model, detail);
     if (fit != EITS_REPLY_OK)
         return fit;
     float difference;

@@ -1,7 +1,5 @@
 #include "app/solve/quality.h"
 
-#include "drivers/adg1206.h"
-
 #include <math.h>
 #include <string.h>
 
@@ -51,8 +49,8 @@ void fw_quality_prepare(fw_engine *engine, fw_frame *frame)
 }
 
 typedef struct evidence {
-    uint32_t significant[FW_ELECTRODES]; /* rows */
-    uint32_t alive;                      /* bit e: a row of electrode e is not dead */
+    uint32_t significant[FW_MAX_ELECTRODES]; /* rows */
+    uint64_t alive;                          /* bit e: a row of electrode e is not dead */
 } evidence;
 
 /* Count one row for its electrodes; limit2: the squared magnitude below which it is dead. */
@@ -68,18 +66,18 @@ static void weigh(const fw_engine *engine, const fw_frame *frame, uint32_t row, 
     for (uint32_t k = 0; k < 4; ++k) {
         const uint32_t electrode = engine->model.protocol[4 * (size_t)row + k];
         ++so_far->significant[electrode];
-        so_far->alive |= (uint32_t)!dead << electrode;
+        so_far->alive |= (uint64_t)!dead << electrode;
     }
 }
 
-static uint32_t find_open(const fw_engine *engine, const fw_frame *frame)
+static uint64_t find_open(const fw_engine *engine, const fw_frame *frame)
 {
     const eits_model *model = &engine->model;
     const float expected_rms = rms_expected(model), min = FW_OPEN_SIGNIFICANT * expected_rms;
     const float fraction =
         expected_rms > 0 ? FW_OPEN_FRACTION * rms_of_z(engine, frame) / expected_rms : 0;
     evidence found = {.alive = 0};
-    uint32_t open = 0;
+    uint64_t open = 0;
     for (uint32_t k = 0; k < model->n_folded; ++k) {
         const float expected2 = model->v_ref[k] * model->v_ref[k];
         if (!(expected2 > min * min))
@@ -87,19 +85,18 @@ static uint32_t find_open(const fw_engine *engine, const fw_frame *frame)
         weigh(engine, frame, model->fold[k].first, fraction * fraction * expected2, &found);
         weigh(engine, frame, model->fold[k].second, fraction * fraction * expected2, &found);
     }
-    for (uint32_t e = 0; e < FW_ELECTRODES; ++e) {
-        if (found.significant[e] >= FW_OPEN_MIN_ROWS && (found.alive & 1u << e) == 0)
-            open |= 1u << e;
+    for (uint32_t e = 0; e < model->n_electrodes; ++e) {
+        if (found.significant[e] >= FW_OPEN_MIN_ROWS && (found.alive >> e & 1u) == 0)
+            open |= (uint64_t)1 << e;
     }
     return open;
 }
 
-static void mark_open(const fw_engine *engine, fw_frame *frame, uint32_t open)
+static void mark_open(const fw_engine *engine, fw_frame *frame, uint64_t open)
 {
     for (uint32_t i = 0; open != 0 && i < engine->model.n_rows; ++i) {
         const uint8_t *row = engine->model.protocol + 4 * (size_t)i;
-        const uint32_t uses = 1u << row[0] | 1u << row[1] | 1u << row[2] | 1u << row[3];
-        if ((uses & open) != 0)
+        if (((open >> row[0] | open >> row[1] | open >> row[2] | open >> row[3]) & 1u) != 0)
             frame->quality[i] |= EITS_QUALITY_OPEN;
     }
 }

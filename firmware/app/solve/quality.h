@@ -10,7 +10,7 @@
 typedef struct fw_quality {
     uint32_t saturated, first_saturated; /* rows that are not masked */
     /* bit e: electrode e is open, compared with the model */
-    uint32_t open;
+    uint64_t open;
     bool checked;                       /* reciprocity could be checked */
     uint32_t worst_row, worst_permille; /* of the frame's rms */
 } fw_quality;

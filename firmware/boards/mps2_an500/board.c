@@ -1,4 +1,6 @@
 /* The emulated board, for the application; its files are in the folder in which QEMU runs. */
+#include "drivers/ad9833.h"
+#include "drivers/adg1206.h"
 #include "mps2.h"
 
 #include <stdlib.h>
@@ -8,6 +10,8 @@ enum { STACK_BYTES = 64 * 1024, WORKSPACE_BYTES = 512 * 1024, LEAVE_FREE = 256, 
 
 extern uint32_t stack_top;
 static _Alignas(16) uint8_t workspace[WORKSPACE_BYTES];
+static fw_ad9833 ad9833;
+static fw_adg1206 adg1206;
 
 static void feed_watchdog(void *ctx)
 {
@@ -59,10 +63,11 @@ int main(void)
         .name = "mps2_an500",
         .serial = "0",
         .f_cpu_hz = MPS2_CPU_HZ,
-        .mclk_hz = MPS2_MCLK_HZ,
         .stack_bytes = STACK_BYTES,
-        .generator = {&mps2_generator_ops, NULL},
-        .multiplexers = {&mps2_multiplexers_ops, NULL},
+        .generator =
+            fw_ad9833_generator(&ad9833, (fw_spi){&mps2_generator_ops, NULL}, MPS2_MCLK_HZ),
+        .multiplexers = fw_adg1206_multiplexers(&adg1206, (fw_lines){&mps2_multiplexers_ops, NULL},
+                                                FW_MAX_ELECTRODES),
         .capture = {&mps2_capture_ops, NULL, MPS2_FULL_SCALE_CODE, MPS2_REFERENCE_UV,
                     MPS2_GAIN_PPM},
         .link = {&mps2_link_ops, NULL},

@@ -6,13 +6,13 @@
  *
  * Each frame lasts frame_us, counted from the start of the scan; the last one stays. Electrodes
  * that do not form a row read 0 V. */
-#include "boards/parts/ad9833_model.h"
+#include "boards/parts/drive_monitor.h"
 #include "mps2.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { MAX_BYTES = 1024 * 1024, LINES = 20 };
+enum { MAX_BYTES = 1024 * 1024 };
 #define PHASE_BITS 28
 #define LATE_RAD   0.7f /* phase of the voltages behind the generator: cables, filters, skin */
 
@@ -55,8 +55,6 @@ static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
 static fw_status write_lines(void *ctx, uint32_t mask, uint32_t levels)
 {
     (void)ctx;
-    if (mask >> LINES != 0)
-        return FW_E_ARGUMENT;
     levels_now = (levels_now & ~mask) | (levels & mask);
     return FW_OK;
 }
@@ -71,11 +69,8 @@ static void wait_ns(void *ctx, uint32_t ns)
 static float connected_volts(uint32_t scanning_us)
 {
     uint8_t four[4];
-    for (uint32_t k = 0; k < 4; ++k) {
-        if ((levels_now >> (16u + k) & 1u) == 0)
-            return 0;
-        four[k] = (uint8_t)(levels_now >> 4u * k & 0xFu);
-    }
+    if (drive_monitor_joined(levels_now, four) != 4)
+        return 0;
     const uint32_t passed = skin.frame_us == 0 ? 0 : scanning_us / skin.frame_us;
     const float *const frame =
         skin.volts + (size_t)(passed < skin.frames ? passed : skin.frames - 1u) * skin.rows;

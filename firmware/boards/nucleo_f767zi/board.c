@@ -1,4 +1,6 @@
 /* The NUCLEO-F767ZI as the application sees it. */
+#include "drivers/ad9833.h"
+#include "drivers/adg1206.h"
 #include "nucleo.h"
 
 /* Codes at 12 bits and 3.3 V. Models are for 1 mA: half of it and a gain of 3 give what 1 mA and
@@ -30,6 +32,9 @@ __attribute__((noreturn)) static void no_clock(void)
     nucleo_restart(NULL); /* the clock may be back */
 }
 
+static fw_ad9833 ad9833;
+static fw_adg1206 adg1206;
+
 int main(void)
 {
     if (!nucleo_clock_start())
@@ -45,15 +50,16 @@ int main(void)
         .name = "nucleo_f767zi",
         .serial = nucleo_serial(),
         .f_cpu_hz = NUCLEO_SYSCLK_HZ,
-        .mclk_hz = NUCLEO_MCLK_HZ,
         .stack_bytes =
             (uint32_t)((uint8_t *)stack_top - (uint8_t *)stack_bottom) - NUCLEO_STACK_GUARD_BYTES,
         .source_ua_rms = SOURCE_UA_RMS,
         .source_ua = SOURCE_UA,
         .gain_ppm = GAIN_PPM,
         .settle_frames = SETTLE_FRAMES,
-        .generator = {&nucleo_generator_ops, NULL},
-        .multiplexers = {&nucleo_multiplexers_ops, NULL},
+        .generator =
+            fw_ad9833_generator(&ad9833, (fw_spi){&nucleo_generator_ops, NULL}, NUCLEO_MCLK_HZ),
+        .multiplexers = fw_adg1206_multiplexers(
+            &adg1206, (fw_lines){&nucleo_multiplexers_ops, NULL}, nucleo_electrodes()),
         .capture = {&nucleo_capture_ops, NULL, FULL_SCALE_CODE, REFERENCE_UV, FRONT_END_GAIN_PPM},
         .link = {&nucleo_link_ops, NULL},
         .store = {&nucleo_store_ops, NULL, NUCLEO_BANK_BYTES, NUCLEO_PAGE_BYTES},

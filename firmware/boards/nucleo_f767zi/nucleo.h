@@ -61,6 +61,7 @@ const char *nucleo_serial(void);
 fw_last_reset nucleo_last_reset(void);
 void nucleo_generator_start(void);
 void nucleo_multiplexers_start(void);
+uint32_t nucleo_electrodes(void);   /* that the fitted multiplexers reach; after the start */
 void nucleo_multiplexers_off(void); /* no current reaches the skin; from any interrupt */
 /* The same; they stay off until the main loop is alive. */
 void nucleo_multiplexers_bar(bool barred);

@@ -126,11 +126,9 @@ static float volts_now(sim_board *sim)
 {
     const eits_model *model = &sim->instrument.solve.engine.model;
     uint8_t joined[4];
-    if ((sim->monitor.lines & FW_MUX_ENABLES) != FW_MUX_ENABLES ||
+    if (drive_monitor_joined(sim->monitor.lines, joined) != 4 ||
         !ad9833_model_runs(&sim->generator))
         return 0;
-    for (uint32_t k = 0; k < 4; ++k)
-        joined[k] = (uint8_t)(sim->monitor.lines >> 4 * k & 15u);
     for (uint32_t tried = 0; tried < model->n_rows; ++tried) {
         sim->row = sim->row + 1u < model->n_rows ? sim->row + 1u : 0;
         if (memcmp(model->protocol + 4 * (size_t)sim->row, joined, sizeof joined) == 0)
@@ -357,20 +355,21 @@ void sim_init(sim_board *sim, const sim_setup *setup)
     memset(sim, 0, sizeof *sim);
     for (uint32_t k = 0; k < FW_BANKS; ++k)
         sim->bank[k] = setup->banks[k];
-    sim->board = (fw_board){.name = setup->name,
-                            .serial = setup->serial,
-                            .mclk_hz = MCLK_HZ,
-                            .frame_period_us = setup->frame_period_us,
-                            .generator = {&GENERATOR, sim},
-                            .multiplexers = {&MULTIPLEXERS, sim},
-                            .capture = {&CAPTURE, sim, FULL_SCALE_CODE, 1, 1000000},
-                            .link = {&LINK, sim},
-                            .store = {&STORE, sim, setup->bank_bytes, SIM_PAGE_BYTES},
-                            .system = &SYSTEM,
-                            .system_ctx = sim,
-                            .frames_given = setup->frames_given,
-                            .workspace = setup->workspace,
-                            .workspace_bytes = setup->workspace_bytes};
+    sim->board = (fw_board){
+        .name = setup->name,
+        .serial = setup->serial,
+        .frame_period_us = setup->frame_period_us,
+        .generator = fw_ad9833_generator(&sim->ad9833, (fw_spi){&GENERATOR, sim}, MCLK_HZ),
+        .multiplexers = fw_adg1206_multiplexers(&sim->adg1206, (fw_lines){&MULTIPLEXERS, sim},
+                                                FW_MAX_ELECTRODES),
+        .capture = {&CAPTURE, sim, FULL_SCALE_CODE, 1, 1000000},
+        .link = {&LINK, sim},
+        .store = {&STORE, sim, setup->bank_bytes, SIM_PAGE_BYTES},
+        .system = &SYSTEM,
+        .system_ctx = sim,
+        .frames_given = setup->frames_given,
+        .workspace = setup->workspace,
+        .workspace_bytes = setup->workspace_bytes};
     memset(sim->page, 0xFF, sizeof sim->page);
     sim_start(sim);
 }

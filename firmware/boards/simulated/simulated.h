@@ -1,9 +1,9 @@
 /* The board behind `sim:SCENE`: the firmware's own application, with simulated parts.
  *
  * From what the drivers write to the generator and the multiplexers, this decodes which electrodes
- * are connected, and at which frequency. The converter has 16 bits and no noise; its range is that
- * of the frames that are shown, and 1 uV until then. It measures frames that the host has
- * simulated. A frame is one scan, and it is chosen when the scan begins.
+ * are connected (up to 64 can be), and at which frequency. The converter has 16 bits and no noise;
+ * its range is that of the frames that are shown, and 1 uV until then. It measures frames that the
+ * host has simulated. A frame is one scan, and it is chosen when the scan begins.
  *
  * Time is counted, not waited for: it passes only in sim_scan_frame, and the processor's work takes
  * none. Everything is in the caller's memory, so one process can have many boards. A board may also
@@ -13,6 +13,8 @@
 
 #include "app/instrument.h"
 #include "boards/parts/drive_monitor.h"
+#include "drivers/ad9833.h"
+#include "drivers/adg1206.h"
 
 #define SIM_PAGE_BYTES 1024u
 
@@ -47,6 +49,8 @@ typedef struct sim_converter {
 typedef struct sim_board {
     fw_board board;
     uint64_t now_us;
+    fw_ad9833 ad9833;
+    fw_adg1206 adg1206;
     ad9833_model generator;
     uint32_t released_us;  /* when its phase began */
     drive_monitor monitor; /* has the lines of the multiplexers */

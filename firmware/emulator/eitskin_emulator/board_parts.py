@@ -5,7 +5,7 @@ from struct import unpack_from
 
 from eitskin.errors import DeviceError
 from eitskin_emulator.analog.ad9833 import Ad9833
-from eitskin_emulator.analog.adg1206 import Multiplexers
+from eitskin_emulator.analog.adg1206 import ELECTRODES, OF_ONE_PART, Multiplexers
 from eitskin_emulator.analog.drive_monitor import DriveMonitor
 from eitskin_emulator.analog.front_end import FrontEnd
 from eitskin_emulator.analog.skin import AnalogSkin
@@ -38,20 +38,23 @@ from eitskin_emulator.serial_line import SerialLine
 
 # the owner's settings (firmware/app/safety/owner_record.h, two sectors of 256 KB)
 PAGES, PAGES_BYTES, RECORD_BYTES, MAGIC = 0x08140000, 0x80000, 128, 0x32455345
-FSYNC_PIN, ENABLE_PIN, MCO_PIN, ADC_PIN, SENSE_PIN = 2, 12, 8, 3, 0
+MORE_FITTED_PIN, MORE_ENABLE_PIN, ENABLE_PIN = 7, 8, 12
+FSYNC_PIN, MCO_PIN, ADC_PIN, SENSE_PIN = 2, 8, 3, 0
 SCK_PIN, MOSI_PIN, TX_PIN, RX_PIN = 10, 12, 8, 9
 MCO_FUNCTION, SPI3_FUNCTION, USART3_FUNCTION = 0, 6, 7
 
 
 class BoardParts:
     """A NUCLEO-F767ZI with ``image`` at 0x08000000 and what ``banks`` hold at 0x08040000 and
-    0x080C0000, before ``skin``.
+    0x080C0000, before ``skin``. If the skin has more than 16 electrodes, the second four
+    multiplexers are fitted.
 
     ``hse_hz`` None: no 8 MHz come from the ST-LINK. What hangs outside the processor
     (``generator``, ``multiplexers``, ``front_end``, ``line``) and ``memories`` outlive its resets.
 
     Raises:
-        DeviceError: the image or a bank is too long, or Unicorn is a version that cannot be used.
+        DeviceError: the image or a bank is too long, the skin has more than 32 electrodes, or
+            Unicorn is a version that cannot be used.
     """
 
     def __init__(
@@ -65,6 +68,11 @@ class BoardParts:
             raise DeviceError(
                 f"the firmware image has {len(image)} bytes; the board's program, a .bin, has"
                 f" {PROGRAM_BYTES} at most"
+            )
+        electrodes = skin.protocol.n_electrodes
+        if electrodes > ELECTRODES:
+            raise DeviceError(
+                f"the skin has {electrodes} electrodes; the board's multiplexers reach {ELECTRODES}"
             )
         self.record, self.clock, self.schedule, self.memories = (
             Record(),
@@ -162,13 +170,15 @@ class BoardParts:
             (0x44, 8): self.adc.reset,
         }
         rcc.resetters |= {(0x30, 20 + number): dma.reset for number, dma in self.dmas.items()}
+        if self.skin.protocol.n_electrodes > OF_ONE_PART:
+            ports["F"].lowered = 1 << MORE_FITTED_PIN
         ports["A"].mode_changed = self._mco
         ports["D"].watch = self._fsync
         ports["E"].watch = lambda at, driven, levels: self.multiplexers.set_addresses(
             at, levels & 0xFFFF
         )
         ports["F"].watch = lambda at, driven, levels: self.multiplexers.set_enables(
-            at, levels >> ENABLE_PIN & 0xF
+            at, levels >> ENABLE_PIN & 0xF | (levels >> MORE_ENABLE_PIN & 0xF) << 4
         )
         self.spi.sent = self.generator.shifted
         self.generator.took = self.drive.word

@@ -141,6 +141,7 @@ def test_the_host_refuses_what_cannot_go_before_it_is_sent(tmp_path):
     (tmp_path / "bad.eitm").write_bytes(b"no model at all")
     with sim_device(board) as device:
         before = stats_of(board).packets_sent
+        device.board = replace(device.board, electrodes=16)
         for given, kind, said in (
             (tmp_path / "none.eitm", FileError, "no such model"),
             (tmp_path / "bad.eitm", ModelError, None),
@@ -160,10 +161,22 @@ def test_a_model_too_large_for_the_bank_is_refused_by_the_host():
         device.upload_model(tiny_blob())
 
 
+def test_32_electrodes_are_live_behind_an_instrument_that_sends_lines(tmp_path):
+    model = decode_model(small_blob(electrodes=32), "the model")
+    volts = ",".join(f"{one:.6g}" for one in model.golden.reference_v)
+    (tmp_path / "lines.csv").write_text(f"{volts}\n" * 12)
+    (tmp_path / "layout.toml").write_text("[port]\nrate_hz = 10\n")
+    url = f"text:{tmp_path / 'lines.csv'}?layout={tmp_path / 'layout.toml'}"
+    with open_device(url, model=small_blob(electrodes=32)) as device:
+        assert (device.board.n_electrodes, device.board.n_rows) == (32, 928)
+        device.tare(4)
+        (frame,) = device.stream(cmd.Stream.RAW, frames=1)
+    assert frame.voltage_v == pytest.approx(model.golden.reference_v, rel=1e-5)
+
+
 @pytest.mark.parametrize(
     ("blob", "said"),
     [
-        (lambda: small_blob(electrodes=32, rank=64), "needs 32 electrodes and the board has 16"),
         (
             lambda: fine_blob("i8"),
             r"4\d{3} pixels, 208 rows, rank 8\) does not fit .* pixels",

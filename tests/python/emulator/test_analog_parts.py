@@ -99,6 +99,18 @@ def test_multiplexers_decode_their_lines():
     assert muxes.violations == []
 
 
+def test_a_second_four_share_the_address_lines():
+    muxes = Multiplexers()
+    muxes.set_addresses(0, 0xF031)
+    muxes.set_enables(10, 0x96)
+    assert muxes.joined == (17, 3, 0, 31)
+    assert muxes.violations == []
+    muxes.set_enables(20, 0x97)
+    assert muxes.violations == ["0.046 us: I+ is on two electrodes"]
+    muxes.set_addresses(30, 0x0031)
+    assert muxes.violations[1:] == ["0.069 us: V- changed its address while enabled"]
+
+
 def test_making_before_breaking_is_told():
     muxes = Multiplexers()
     muxes.set_enables(0, 0xF)

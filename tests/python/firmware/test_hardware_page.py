@@ -19,6 +19,7 @@ MULTIPLEXERS = ("I+", "I-", "V+", "V-")
 CONSTANTS = {
     "BUTTON": 13,
     "SUPPLY_GOOD": 11,
+    "MORE_FITTED_PIN": 7,
     "FSYNC": 2,
     "LED_GREEN": 0,
     "LED_BLUE": 7,
@@ -31,12 +32,13 @@ def firmware_pins() -> dict[str, tuple[str, int]]:
     program = "".join(path.read_text(encoding="utf-8") for path in sorted(BOARD.glob("*.c")))
     call = re.compile(r"nucleo_pin\(GPIO([A-F])_BASE, ([\w +]+), (PIN_\w+), (\d+),")
     pins: dict[str, tuple[str, int]] = {}
-    enables = int(re.findall(r"ENABLE_PIN = (\d+)", program)[0])
+    first = {name: int(pin) for name, pin in re.findall(r"(\w*ENABLE_PIN) = (\d+)", program)}
     for port, pin, mode, alternate in call.findall(program):
         if pin == "line":
             numbers = list(range(16))
-        elif pin == "ENABLE_PIN + line":
-            numbers = list(range(enables, enables + 4))
+        elif pin.endswith("ENABLE_PIN + line"):
+            start = first[pin.split()[0]]
+            numbers = list(range(start, start + 4))
         else:
             numbers = [CONSTANTS[pin] if pin in CONSTANTS else int(pin)]
         for number in numbers:
@@ -89,18 +91,19 @@ def test_the_firmware_uses_these_pins_and_no_others():
 
 
 def test_the_lines_are_in_the_order_of_the_hal():
-    """Lines 0-3 are A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V-
-    (firmware/hal/hal.h)."""
+    """Lines 0-3 are A0..A3 of I+, 4-7 of I-, 8-11 of V+, 12-15 of V-; 16..19 enable I+, I-, V+, V-,
+    and 20..23 those of electrodes 16 to 31 (firmware/drivers/adg1206.h)."""
     to = {wire.pin: wire.to for wire in WIRES}
     for number, name in enumerate(MULTIPLEXERS):
         assert to[f"PF{12 + number}"] == f"ADG1206 {name} EN"
+        assert to[f"PF{8 + number}"] == f"EN of {name} of electrodes 16 to 31"
         for address in range(4):
             assert to[f"PE{4 * number + address}"] == f"ADG1206 {name} A{address}"
 
 
 def test_no_place_is_taken_twice():
     places = [place for wire in WIRES for place in (wire.pin, *wire.places)]
-    assert len(places) == len(set(places)) > len(WIRES) == 33
+    assert len(places) == len(set(places)) > len(WIRES) == 38
 
 
 def test_the_flash_map_is_the_linkers_and_the_stores():

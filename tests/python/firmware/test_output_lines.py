@@ -5,13 +5,17 @@ import pytest
 from bare_image import BareImage
 
 PORT_E_BSRR, PORT_F_BSRR = 0x40021018, 0x40021418
-ENABLE_PIN = 12
-ADDRESSES, ENABLES = 0x0000FFFF, 0x000F0000
+ADDRESSES, ENABLES = 0x0000FFFF, 0x00FF0000
 
 
 @pytest.fixture(scope="module")
 def image(elf) -> BareImage:
     return BareImage(elf)
+
+
+def pins_of(lines: int) -> int:
+    """Lines 16 to 19 are PF12 to PF15, lines 20 to 23 are PF8 to PF11."""
+    return (lines >> 16 & 0xF) << 12 | (lines >> 20 & 0xF) << 8
 
 
 def write(image: BareImage, mask: int, levels: int) -> tuple[int, int, int]:
@@ -24,20 +28,21 @@ def write(image: BareImage, mask: int, levels: int) -> tuple[int, int, int]:
 
 def test_lines_take_their_levels(image):
     rng = np.random.default_rng(2)
-    for mask in (ADDRESSES, ENABLES, ADDRESSES | ENABLES, 0x00010, 0x80000, 0):
-        for levels in map(int, rng.integers(0, 2**20, 8)):
+    for mask in (ADDRESSES, ENABLES, ADDRESSES | ENABLES, 0x00010, 0x480000, 0):
+        for levels in map(int, rng.integers(0, 2**24, 8)):
             status, port_e, port_f = write(image, mask, levels)
             assert status == 0
             high, low = mask & levels, mask & ~levels
             assert port_e == (high & ADDRESSES) | (low & ADDRESSES) << 16
-            assert port_f == (high >> 16) << ENABLE_PIN | (low >> 16) << (ENABLE_PIN + 16)
+            assert port_f == pins_of(high) | pins_of(low) << 16
 
 
 def test_lines_that_are_not_there_are_refused(image):
-    assert write(image, 1 << 20, 0) == (-1, 0, 0)
+    assert write(image, 1 << 24, 0) == (-1, 0, 0)
 
 
 def test_nothing_is_connected_before_the_pins_are_outputs(image):
     image.call("nucleo_multiplexers_start")
-    assert image.read(PORT_F_BSRR) == 0xF000 << 16
-    assert image.read(0x40021400) >> 24 == 0x55 and image.read(0x40021000) == 0x55555555
+    assert image.read(PORT_F_BSRR) == 0xFF00 << 16
+    assert image.read(0x40021400) >> 16 == 0x5555 and image.read(0x40021000) == 0x55555555
+    assert image.read(0x40021400) >> 14 & 3 == 0  # PF7, which says how many there are

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from eitskin.arrays import FloatArray, IntArray
 from eitskin_emulator.analog.ad9833 import Ad9833
-from eitskin_emulator.analog.adg1206 import Multiplexers, Switching
+from eitskin_emulator.analog.adg1206 import ELECTRODES, Multiplexers, Switching
 from eitskin_emulator.analog.converter import CODE_V, STEPS, codes
 from eitskin_emulator.analog.fixture import Fixture
 from eitskin_emulator.analog.skin import AnalogSkin
@@ -44,7 +44,7 @@ class FrontEnd:
         self.bias_codes, self.noise_codes = 0.0, 0.0  # off the middle; rms
         self.tau_ticks = TAU_TICKS
         # electrode that each address of I+, I-, V+, V- joins, None: nothing
-        self.wired: list[list[int | None]] = [list(range(16)) for _ in range(4)]
+        self.wired: list[list[int | None]] = [list(range(ELECTRODES)) for _ in range(4)]
         self.fixture: Fixture | None = None  # in place of the skin
         self._random = np.random.default_rng(1)
         self.samples = self.unsettled = 0
