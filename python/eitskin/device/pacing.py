@@ -80,6 +80,13 @@ class Pacer:
         """Pause, and let one frame go."""
         self._change(paused=True, steps=1)
 
+    def jump(self) -> None:
+        """The frames go on at another time; of a pause, one shows where."""
+        with self._changed:
+            self._start, self._woken = None, False
+            self._steps = 1 if self._paused else 0
+            self._changed.notify_all()
+
     def set_speed(self, speed: float) -> None:
         """From the next frame on."""
         self._change(speed=speed)

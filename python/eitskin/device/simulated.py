@@ -6,6 +6,8 @@ on it is 0. The clock runs only while the board scans for someone. Deterministic
 """
 
 import zlib
+from collections.abc import Sequence
+from math import isfinite
 
 import numpy as np
 
@@ -14,8 +16,13 @@ from eitskin.device.host_board import HostBoard
 from eitskin.device.transport import Capabilities, SimulatedScene, Transport
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.board_frames import BoardFrames
+from eitskin.scene.laws import ShortCircuit
 from eitskin.scene.library_scenes import find_scene
+from eitskin.scene.random_touches import TrueTouch
+from eitskin.skin.skin import size_to_paper
 from eitskin.threads import one_at_a_time
+
+FINGER_MM = 8.0  # radius of a finger that a program presses, on a skin of the paper's size
 
 
 class SimBoard(HostBoard):
@@ -31,6 +38,9 @@ class SimBoard(HostBoard):
         period_us = max(round(1e6 / scene.rate_hz), 1)
         super().__init__("simulated", f"{serial:08X}", banks, period_us=period_us)
         self.frames = frames
+        self.fingers: tuple[TrueTouch, ...] = ()
+        """Fingers on the skin beside the scene's touches, from the next scan on."""
+        self._shown: tuple[TrueTouch, ...] = ()  # the fingers of the last scan
 
     @property
     @one_at_a_time
@@ -53,6 +63,9 @@ class SimBoard(HostBoard):
         if not self.wanted:
             return False
         self._show_skin()
+        if self._shown != self.fingers:
+            self._shown = self.fingers
+            self._lib.sim_put(self._sim, self._ffi.NULL, 0, 0)  # each frame is asked for again
         while not self._lib.sim_scan_frame(self._sim):
             self._put(self._lib.sim_frame_wanted(self._sim))
         return True
@@ -73,8 +86,14 @@ class SimBoard(HostBoard):
 
     def _put(self, frame: int) -> None:
         """The frames around number ``frame`` of all, as far as they are known; where touches move,
-        that one with its rows as they will be when this scan comes to them."""
+        that one with its rows as they will be when this scan comes to them; where fingers press,
+        that one as they and the scene's touches are in the middle of the scan."""
         scene = self.frames.scene
+        if self._shown:
+            pressed = self._rows.pressed(frame, self._shown)
+            self._volts = np.ascontiguousarray(pressed, np.float32)
+            self._lib.sim_put_once(self._sim, self._pointer(self._volts, "float *"), frame)
+            return
         if self._rows.moves and frame >= scene.quiet_frames:
             delays_us = np.zeros(self._rows.scene.protocol.n_rows, np.uint32)
             self._lib.sim_row_delays(self._sim, self._pointer(delays_us, "uint32_t *"))
@@ -95,7 +114,9 @@ class SimTransport(Transport):
         self.url = self.name = f"sim:{name}"
         self.board, self._loop = board, loop
         scene = SimulatedScene(name, loop=loop, rate_hz=board.frames.scene.rate_hz)
-        self._capabilities = Capabilities(own_clock=True, scene=scene)
+        self._outline = board.frames.scene.skin.outline
+        finger_mm = FINGER_MM * size_to_paper(self._outline)
+        self._capabilities = Capabilities(own_clock=True, scene=scene, finger_mm=finger_mm)
 
     @property
     def capabilities(self) -> Capabilities:
@@ -122,6 +143,11 @@ class SimTransport(Transport):
 
     def begin_scene(self) -> None:  # with the next scan
         self.board.begin_scene()
+
+    def press(self, places_mm: Sequence[tuple[float, float]]) -> None:
+        finger_mm, contrast = self._capabilities.finger_mm or FINGER_MM, ShortCircuit().contrast
+        on = [p for p in places_mm if isfinite(sum(p)) and self._outline.contains([p]).all()]
+        self.board.fingers = tuple(TrueTouch(x, y, finger_mm, contrast) for x, y in on)
 
     def close(self) -> None:
         """Nothing is held."""

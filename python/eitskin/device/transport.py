@@ -2,10 +2,11 @@
 that it can do. Nobody asks a transport for more than stands here."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from eitskin.device.wire.packets import BoardHashes
+from eitskin.errors import DeviceError
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class Capabilities:
         slow: its time passes more slowly than ours: ``watch`` says how far it is.
         baud: bits per second of the line, where a line limits how many frames come.
         scene: what a simulated skin is shown; None before a real one.
+        finger_mm: the radius of the fingers that ``press`` puts on a simulated skin; None: the skin
+            cannot be pressed by a program.
         offset, scale: an instrument's own number is a voltage after ``offset`` was added to it and
             it was multiplied by ``scale``.
         instrument: the frames come from another instrument, which no command can reset.
@@ -50,6 +53,7 @@ class Capabilities:
     slow: bool = False
     baud: int | None = None
     scene: SimulatedScene | None = None
+    finger_mm: float | None = None
     offset: float = 0.0
     scale: float = 1.0
     instrument: bool = False
@@ -134,6 +138,18 @@ class Transport(ABC):
         board's clock at the scene's time 0, in us; None: it is when the next scan begins, or the
         skin is real."""
         return None
+
+    def press(self, places_mm: Sequence[tuple[float, float]]) -> None:
+        """Put fingers on a simulated skin at ``places_mm``, beside the touches of its scene, from
+        the next scan on and until the next call; none lifts them. A finger that is not on the skin
+        touches nothing. May be called from any thread.
+
+        Raises:
+            DeviceError: the skin cannot be pressed by a program.
+        """
+        raise DeviceError(
+            f"{self.name or self.url}: only the skin of  sim:  can be pressed by a program"
+        )
 
     def watch(self, progress: Callable[[float], None] | None) -> None:  # noqa: B027 -- none is slow
         """Call ``progress`` with the board's time about once per second while a slow board is

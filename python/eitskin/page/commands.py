@@ -26,6 +26,9 @@ from eitskin.session.settings import KINDS
 from eitskin.tuning.front import named_preset
 
 AGAIN_S = 10.0
+MAX_FINGERS = 5  # that a page presses at once
+MAX_PLACE_MM = 1e6
+MAX_SEEK_S = 1e7
 T = TypeVar("T")
 Answer = Future[str] | str
 
@@ -37,12 +40,32 @@ def _free(path: Path) -> Path:
     return next(one for one in chain([path], numbered) if not one.exists())
 
 
+def _places(value: object) -> list[tuple[float, float]]:
+    """The places of fingers in a page's message."""
+    places: list[Any] = value if isinstance(value, list) else [None]
+    if len(places) > MAX_FINGERS or not all(_is_place(one) for one in places):
+        raise UsageError(
+            f"press: {str(value)[:60]!r} cannot be; give at most {MAX_FINGERS} places, each x and y"
+            " in mm"
+        )
+    return [(float(x), float(y)) for x, y in places]
+
+
+def _is_place(value: object) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) == 2
+        and all(type(x) in (int, float) and abs(x) < MAX_PLACE_MM for x in value)
+    )
+
+
 class PageCommands:
     """Commands for the session of ``reader``. Each answers with a line, or raises an EitskinError;
     a Future gives either later."""
 
     def __init__(self, reader: SessionReader) -> None:
         self._reader = reader
+        self._recorded: Path | None = None
         self._tare_again_s = 0.0  # until then a tare is taken although something touches the skin
 
     def do(self, what: object, value: object) -> Answer:
@@ -51,6 +74,10 @@ class PageCommands:
             return self.pace(str(what))
         if what == "speed":
             return self.pace("speed", read_speed(str(value), "speed"))
+        if what == "press" and isinstance(value, dict):
+            return self.press({name: _places(one) for name, one in value.items()})
+        if what == "seek" and isinstance(value, int | float) and 0 <= value <= MAX_SEEK_S:
+            return self.seek(float(value))
         if what == "tare":
             return self.tare()
         if what == "undo-tare":
@@ -68,6 +95,42 @@ class PageCommands:
         if what == "iterations" and isinstance(value, int) and 1 <= value <= 1_000_000:
             return self.solver(iterations=value)
         raise UsageError(f"{what}: {value!r} cannot be")
+
+    def press(self, places_mm: dict[str, list[tuple[float, float]]]) -> str:
+        """Put fingers on the simulated skins of these names, and lift them from the others."""
+        parts = self._reader.live().parts
+        for name in places_mm:
+            if name not in parts:
+                raise UsageError(f"press: there is no skin {name[:60]!r} here")
+        for name, part in parts.items():
+            if part.capabilities.finger_mm is not None or places_mm.get(name):
+                part.device.transport.press(places_mm.get(name, []))
+        return ""
+
+    def seek(self, time_s: float) -> Answer:
+        """Go on with a recording at ``time_s``, also where it is over."""
+        session = self._reader.session
+        if session is None:
+            self._reader.again(time_s)
+            return f"from {time_s:.1f} s"
+
+        def action(device: Device) -> str:
+            recording.seek(time_s)
+            return f"from {time_s:.1f} s"
+
+        if not isinstance(session, Session):
+            raise UsageError(f"{session.name} is a robot: view the recording of one skin alone")
+        recording = session
+        return recording.ask(action)
+
+    def recording(self) -> Path:
+        """The recording that is shown, or the last one that was made here."""
+        session = self._reader.session or self._reader.last
+        shown = session is not None and session.replays
+        path = Path(session.name) if session is not None and shown else self._recorded
+        if path is None:
+            raise UsageError("nothing has been recorded here yet; press  Record  first")
+        return path
 
     def tare(self) -> Future[str]:
         """Take the reference. Where something touches the skin, the next tare within ``AGAIN_S``
@@ -199,6 +262,7 @@ class PageCommands:
         if recorder is None:
             return ""
         recorder.close()
+        self._recorded = recorder.path
         return f"recorded {recorder.packets} packets in {recorder.path.name}"
 
     def pace(self, what: str, speed: float | None = None) -> str:

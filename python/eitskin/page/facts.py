@@ -53,9 +53,9 @@ def frame_bytes(number: int, frame: Frame) -> bytes:
     return b"".join((head, pixels, rows, encoded(message).encode()))
 
 
-def setup_text(whole: AnySession, may_command: bool) -> str:
+def setup_text(whole: AnySession, may_command: bool, length_s: float | None = None) -> str:
     """Return the facts that do not change from frame to frame: those of the first skin, and
-    ``skins`` with what differs from skin to skin."""
+    ``skins`` with what differs from skin to skin; ``length_s`` of a recording."""
     session = next(iter(whole.parts.values()))
     board, how, solver = session.device.board, session.settings, session.solver
     mean_v = None if session.reference is None else session.reference.mean_v
@@ -67,6 +67,7 @@ def setup_text(whole: AnySession, may_command: bool) -> str:
         "name": (session.given_name or "") if whole.source else whole.name,
         "replays": whole.replays,
         "timed": whole.timed,
+        "length_s": length_s,
         "electrodes": board.n_electrodes,
         "frame_us": board.frame_us,
         "may_command": may_command,
@@ -101,6 +102,7 @@ def _one(name: str, session: Session, base: Pose | None) -> dict[str, Any]:
         "link_pose": link.matrix().tolist(),
         "mode": [kind for kind in KINDS if session.mode & Stream[kind.upper()]],
         "has_truth": session.observer is not None,
+        "finger_mm": session.capabilities.finger_mm,
         "skin": _skin(session),
     }
 

@@ -25,7 +25,7 @@ class PageClient:
     """One page: what waits for it, and what it has not drawn yet."""
 
     def __init__(self) -> None:
-        self.may_command = False
+        self.may_command = self.presses = False
         self.sent = self.dropped = 0
         self.latencies_ms: deque[float] = deque(
             maxlen=100

@@ -3,15 +3,18 @@ each from its opening to its end."""
 
 import threading
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from eitskin.device.open import open_device
+from eitskin.device.timing import split_timing
 from eitskin.device.transport import LinkEvent
-from eitskin.errors import DeviceError
+from eitskin.errors import DeviceError, EitskinError
 from eitskin.page.teacher import Teacher
 from eitskin.session.frame import DriveReport, Frame, Message, Notice
+from eitskin.session.replay import recording_length_s
 from eitskin.session.robot_session import FOR_EVER, AnySession, open_session
 from eitskin.session.session import Session
 from eitskin.session.settings import SessionSettings
@@ -57,6 +60,8 @@ class SessionReader:
         self.error: Exception | None = None
         self.frames = 0
         self._reported_s: dict[str | None, float] = {}  # by source
+        self.length_s: float | None = None  # of a recording, once it has been read
+        self._begin_s = 0.0  # where the next session of a recording begins
         self._stopping, self._again = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="eitskin view", daemon=True)
 
@@ -77,8 +82,9 @@ class SessionReader:
             session.close()  # what it waits for fails; sinks may still send what is queued
             self._thread.join(SINKS_S)
 
-    def again(self) -> None:
-        """Open the device again, where a session is over."""
+    def again(self, time_s: float = 0.0) -> None:
+        """Open the device again, where a session is over; a recording goes on at ``time_s``."""
+        self._begin_s = time_s
         self._again.set()
 
     def live(self) -> AnySession:
@@ -125,12 +131,27 @@ class SessionReader:
             self._set("live", "")
             if self._stopping.is_set():
                 return
+            if session.replays and isinstance(session, Session):
+                self._begin_recording(session)
             try:
                 for _ in session.messages():
                     pass  # the consumers have it
             finally:
                 self.settings = replace(session.settings, record=None)
                 self._speed = session.pacer.speed
+
+    def _begin_recording(self, session: Session) -> None:
+        """Begin where a page has asked for, and find out meanwhile how long the recording is."""
+        begin_s, self._begin_s = self._begin_s, 0.0
+        if begin_s:
+            session.ask(lambda device: session.seek(begin_s))
+        if self.length_s is None:
+            threading.Thread(target=self._measure, name="eitskin length", daemon=True).start()
+
+    def _measure(self) -> None:
+        with suppress(EitskinError), open_device(split_timing(self._url)[0]) as recording:
+            self.length_s = recording_length_s(recording)
+            self.report("setup", {})
 
     def _take(self, message: Message) -> None:
         """The page as a consumer of a session."""

@@ -38,6 +38,7 @@ FILES = {
     "/": ("index.html", "text/html; charset=utf-8"),
     "/page.js": ("page.js", "text/javascript; charset=utf-8"),
     "/drawing.js": ("drawing.js", "text/javascript; charset=utf-8"),
+    "/plots.js": ("plots.js", "text/javascript; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
     "/icon.svg": ("icon.svg", "image/svg+xml"),
 }
@@ -202,7 +203,7 @@ class PageServer:
     def _tell_setup(self, page: PageClient) -> None:
         session = self.reader.session or self.reader.last
         if session is not None:
-            page.tell(setup_text(session, page.may_command))
+            page.tell(setup_text(session, page.may_command, self.reader.length_s))
 
     def _app(self) -> Starlette:
         from starlette.applications import Starlette
@@ -210,6 +211,7 @@ class PageServer:
 
         routes: list[Any] = [Route(path, self._file, methods=["GET"]) for path in FILES]
         routes.append(Route("/model", self._model, methods=["POST"]))
+        routes.append(Route("/recording", self._recording, methods=["GET"]))
         routes.append(WebSocketRoute("/live", self._live))
         return Starlette(routes=routes)
 
@@ -263,14 +265,35 @@ class PageServer:
         }
         return Response(content, media_type=kind, headers=headers)
 
-    async def _model(self, request: Request) -> Response:
-        from starlette.requests import ClientDisconnect
+    def _refused(self, request: Request) -> Response | None:
+        """The answer to a request of another site, or without the token."""
         from starlette.responses import JSONResponse
 
         if not self._from_here(request.headers):
             return JSONResponse({"error": "another site asks"}, 403)
         if not self._knows(request.headers.get("x-eitskin-token")):
             return JSONResponse({"error": "this needs the token"}, 401)
+        return None
+
+    async def _recording(self, request: Request) -> Response:
+        from starlette.responses import FileResponse, JSONResponse
+
+        if (refused := self._refused(request)) is not None:
+            return refused
+        try:
+            path = self.commands.recording()
+            if not path.is_file():
+                raise UsageError(f"{path.name}: the recording is not there any more")
+        except EitskinError as error:
+            return JSONResponse({"error": str(error)}, 404)
+        return FileResponse(path, filename=path.name, media_type="application/octet-stream")
+
+    async def _model(self, request: Request) -> Response:
+        from starlette.requests import ClientDisconnect
+        from starlette.responses import JSONResponse
+
+        if (refused := self._refused(request)) is not None:
+            return refused
         body = bytearray()
         try:
             async for piece in request.stream():
@@ -315,6 +338,9 @@ class PageServer:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             self.hub.pages.discard(page)
+            if page.presses:
+                with suppress(EitskinError):  # the session is over
+                    self.commands.press({})
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -367,18 +393,21 @@ class PageServer:
             reason = "this needs the token: open the address that  eitskin view  printed"
             page.tell(_refusal(reason))
             return
+        what, value = message.get("do"), message.get("value")
+        if what == "press":
+            page.presses = isinstance(value, dict) and any(value.values())
         try:
-            done = self.commands.do(message.get("do"), message.get("value"))
+            done = self.commands.do(what, value)
             if isinstance(done, Future):
                 done = await asyncio.wrap_future(done)
         except Exception as error:  # of whatever kind: the page waits for an answer
-            page.tell(_refusal(str(error) or type(error).__name__))
+            page.tell(_refusal(str(error) or type(error).__name__, what))
             return
-        page.tell(text_of("answer", ok=True, text=done))
+        page.tell(text_of("answer", ok=True, text=done, do=what))
 
 
-def _refusal(text: str) -> str:
-    return text_of("answer", ok=False, text=text)
+def _refusal(text: str, what: object = None) -> str:
+    return text_of("answer", ok=False, text=text, do=what if isinstance(what, str) else None)
 
 
 async def _closed(closing: Awaitable[None]) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.scene.description import Scene
+from eitskin.scene.random_touches import TrueTouch
 from eitskin.skin.protocol import Protocol, in_order, table
 
 # A scene with up to so many frames, untouched ones included, is simulated at once.
@@ -98,6 +99,15 @@ class SceneRows:
         end_s = (scene.frames - 1) / scene.rate_hz + scene.scan_s
         before = self._maker.work.solves
         volts = self._maker.frame(frame, np.minimum(row_times_s, end_s))
+        self.solves += self._maker.work.solves - before
+        return volts
+
+    def pressed(self, frame: int, fingers: tuple[TrueTouch, ...]) -> FloatArray:
+        """Return the frame number ``frame`` (m,) with ``fingers`` beside the scene's touches, as if
+        all of them were still during its scan."""
+        self._open(frame)
+        before = self._maker.work.solves
+        volts = self._maker.pressed(frame, fingers)
         self.solves += self._maker.work.solves - before
         return volts
 

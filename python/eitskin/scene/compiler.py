@@ -7,7 +7,7 @@ decisions.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -85,6 +85,14 @@ class States:
             change = self.change(touches, deformation)
             self.all.append(State(touches, change, contact, frame, deformation))
         return self._number[key]
+
+    def with_fingers(self, number: int, fingers: tuple[TrueTouch, ...]) -> State:
+        """Return state ``number`` with ``fingers`` beside its touches. It gets no number, and
+        nothing of it is kept."""
+        state = self.all[number]
+        touches, flat = state.touches + fingers, state.deformation == FLAT
+        matrix = None if flat else state.deformation.matrix
+        return replace(state, touches=touches, change=self._cover.change(touches, matrix))
 
     def change(self, touches: tuple[TrueTouch, ...], deformation: Deformation = FLAT) -> Change:
         """Return how ``touches`` change the conductivity of the deformed skin."""

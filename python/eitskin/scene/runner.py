@@ -17,6 +17,7 @@ from eitskin.scene.deformation import FLAT, Deformation, deformed
 from eitskin.scene.description import Scene
 from eitskin.scene.forward_steps import Factorise, FactoriseComplex, Forward, Update, Work
 from eitskin.scene.motion import Mix
+from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.reading import PlainReader, TrueVoltages, WholeReader, solved_impedance
 from eitskin.scene.truth import truth_of
 from eitskin.skin.skin import skin_to_table
@@ -58,21 +59,24 @@ class FrameMaker:
         states = compiled.states
         self._readings = {k: self._read(v, states[k]) for k, v in compiled.known.items()}
         self._still: tuple[tuple[int, int], FloatArray] = ((-1, -1), np.zeros(0))
+        self._pressed: tuple[State, TrueVoltages] | None = None
 
     def reading(self, number: int) -> TrueVoltages:
         """Return the voltages of state ``number`` before excitation, front end and converter."""
         if number not in self._readings:
-            state = self.compiled.table.all[number]
-            forward, thickness = self._forward, state.deformation.thickness
-            if state.deformation != FLAT:
-                forward = self._deformed(state.deformation)
-            solved = forward.electrodes(
-                self._background(state) * thickness,
-                state.change,
-                solved_impedance(state.contacts) / thickness,
-            )
-            self._readings[number] = self._read(solved, state)
+            self._readings[number] = self._solved(self.compiled.table.all[number])
         return self._readings[number]
+
+    def _solved(self, state: State) -> TrueVoltages:
+        forward, thickness = self._forward, state.deformation.thickness
+        if state.deformation != FLAT:
+            forward = self._deformed(state.deformation)
+        solved = forward.electrodes(
+            self._background(state) * thickness,
+            state.change,
+            solved_impedance(state.contacts) / thickness,
+        )
+        return self._read(solved, state)
 
     def _deformed(self, how: Deformation) -> Forward:
         """Return the forward step of a deformed skin; the last one is kept."""
@@ -92,6 +96,24 @@ class FrameMaker:
         if key != self._still[0]:
             self._still = key, self._made(frame, self.reading(key[1]))
         return self._still[1]
+
+    def pressed(self, frame: int, fingers: tuple[TrueTouch, ...]) -> FloatArray:
+        """Return frame number ``frame``, (m,) in V, with ``fingers`` beside the scene's touches;
+        all of them stay as they are in the middle of its scan. Only the last state is kept."""
+        state = self.compiled.table.with_fingers(self._middle_state(frame), fingers)
+        last = self._pressed
+        if last is None or (last[0].touches, last[0].frame) != (state.touches, state.frame):
+            self._pressed = last = state, self._solved(state)
+        return self._made(frame, last[1])
+
+    def _middle_state(self, frame: int) -> int:
+        place = frame - self.compiled.frames.start
+        mix = self.compiled.mixes.get(place)
+        if mix is None:
+            return int(self.compiled.state_of_frame[place])
+        places = self.compiled.scene.protocol.scan_places
+        places = self.compiled.scene.protocol.scan_places
+        return int(mix.lower[np.argsort(places)[len(places) // 2]])
 
     def _made(self, frame: int, reading: TrueVoltages) -> FloatArray:
         """Return the recorded frame for true voltages: they pass through the front end and the

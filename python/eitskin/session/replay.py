@@ -2,7 +2,12 @@
 
 from dataclasses import replace
 
+from eitskin.device.client import Device
+from eitskin.device.wire.link_table import Stream
+from eitskin.session.assemble import read_frames
 from eitskin.session.frame import DriveReport, Frame, Message
+
+FRAME_KINDS = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 
 class Replay:
@@ -14,7 +19,8 @@ class Replay:
         self._every, self._offset_us = every, offset_us
         self._start_us: int | None = None
         self._count = self._step_us = 0
-        self._last_us = offset_us
+        self.last_us = offset_us
+        """The time of the last frame that was shown."""
 
     def take(self, message: Message) -> Message | None:
         """``message`` as it is shown; None where it is not."""
@@ -28,7 +34,7 @@ class Replay:
         self._count += 1
         if (self._count - 1) % self._every:
             return None
-        self._step_us, self._last_us = time_us - self._last_us, time_us
+        self._step_us, self.last_us = time_us - self.last_us, time_us
         return replace(message, time_us=time_us)
 
     def _shown_us(self, time_us: int) -> int:
@@ -38,6 +44,14 @@ class Replay:
 
     def again(self) -> "Replay | None":
         """The recording once more, as if it went on; None where it showed no time that passes."""
-        if self._last_us <= self._offset_us:
+        if self.last_us <= self._offset_us:
             return None
-        return Replay(self._every, self._last_us + self._step_us)
+        return Replay(self._every, self.last_us + self._step_us)
+
+
+def recording_length_s(recording: Device) -> float:
+    """The time of the last frame of a ``recording``, as a replay counts it. It reads all of it."""
+    replay = Replay()
+    for message in read_frames(recording, FRAME_KINDS):
+        replay.take(message)
+    return replay.last_us / 1e6

@@ -28,6 +28,7 @@ from eitskin.device.streaming import LEAVE_S, STOP_S, packet_stream
 from eitskin.device.timing import check_name, check_speed, is_name, split_name, split_timing
 from eitskin.device.transport import Capabilities
 from eitskin.device.wire.link_table import Setting, Stream
+from eitskin.errors import UsageError
 from eitskin.robot.placement import Placement
 from eitskin.robot.pose import Pose
 from eitskin.session.assemble import Assembler, Clock
@@ -117,6 +118,8 @@ class Session:
         self.consumers: list[Callable[[Message], None]] = []
         self._novelty = Novelty()
         self._last_s: float | None = None  # of the last frame
+        self._replay: Replay | None = None
+        self._skip_us: int | None = None  # what comes before is not shown
         self._requests = Requests()
         self._stopping, self._started, self._every = threading.Event(), False, 1
         self._starting = threading.RLock()
@@ -244,6 +247,21 @@ class Session:
         if not self.replays:
             self._every = self.settings.every or self._carried()
 
+    def seek(self, time_s: float) -> None:
+        """Go on with a recording at ``time_s``: what lies between is read and not shown. Back from
+        there, it is read from its beginning.
+
+        Raises:
+            UsageError: it is no recording.
+        """
+        if self._replay is None:
+            raise UsageError(f"{self.name} is no recording: its time cannot be chosen")
+        self._skip_us = round(1e6 * time_s)
+        if self._skip_us < self._replay.last_us:
+            self._read_again(Replay(self.settings.every or 1))
+            self._gestures = StreamGestures(self.settings.zones)
+        self.pacer.jump()
+
     def change_solver(self, solver: SolverSettings) -> None:
         """Solve with other settings from the next frame on."""
         self.solver = set_up(self.device, ScanSettings(), solver, self.known)
@@ -344,7 +362,7 @@ class Session:
             came = self._assembler.rest() if self._packets.over else []
         for one in came:
             message = one if self._replay is None else self._replay.take(one)
-            if message is None:
+            if message is None or self._skipped(message):
                 continue
             if isinstance(message, Frame):
                 if self._over(message):
@@ -355,16 +373,29 @@ class Session:
                 self.pacer.hold(message.time_us)
             yield message.confirmed() if self.settings.confirmed else message
 
+    def _skipped(self, message: Message) -> bool:
+        """Whether ``message`` lies before the time that was sought."""
+        if self._skip_us is None:
+            return False
+        if isinstance(message, Notice) or message.time_us < self._skip_us:
+            return True
+        self._skip_us = None
+        return False
+
     def _begin_again(self) -> bool:
         """Open a looped recording once more; False where nothing comes any more."""
         again = self._replay.again() if self._replay is not None and self._loops else None
         if again is None:
             return False
+        self._read_again(again)
+        return True
+
+    def _read_again(self, replay: Replay) -> None:
+        """Read the recording from its beginning."""
         self.device.close()
         self.device = self._open()
-        self._replay, self._clock = again, Clock()
+        self._replay, self._clock = replay, Clock()
         self._begin_stream()
-        return True
 
     def _answer_requests(self) -> None:
         """Let others talk to the board; its stream stops meanwhile. A board that does not even stop

@@ -7,15 +7,19 @@ from itertools import zip_longest
 
 import numpy as np
 import pytest
-from device_helpers import FRAMES, UNTOUCHED, frames, of, raw_frames, sim_board, sim_device
+from device_helpers import FRAMES, UNTOUCHED, frames, of, raw_frames, scene, sim_board, sim_device
 
 from eitskin.core.drawing import TouchDrawing
-from eitskin.device.known_model import board_options
+from eitskin.device.known_model import board_options, scanned_protocol
+from eitskin.device.simulated import FINGER_MM
 from eitskin.device.wire import link_table as cmd
 from eitskin.device.wire.link_table import FaultCode, Quality, ReplyStatus, Stream
 from eitskin.device.wire.packets import Fault, RawFrame, SolvedImage, SolvedTouches
 from eitskin.errors import DeviceError, UsageError
 from eitskin.model.options import default_options
+from eitskin.scene.board_frames import BoardFrames, SceneRows
+from eitskin.scene.random_touches import TrueTouch
+from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt
 
@@ -107,6 +111,44 @@ def test_board_time_is_the_scenes_and_the_scene_ends():
         assert device.transport.ended
         assert list(device.stream(Stream.RAW)) == []
         assert device.stats().frames_scanned == FRAMES  # commands are still answered
+
+
+def test_a_finger_that_presses_is_a_touch_of_the_scene_until_it_lifts():
+    """Frames of a pressed skin are those of a scene that has this touch, too."""
+    touch = TouchTrack((Keyframe(-1e9, 30.0, -20.0, FINGER_MM),), hold=True)
+    pressed_scene = replace(scene(), touches=(*scene().touches, touch))
+    with sim_device() as device:
+        expected, alone = (
+            BoardFrames(one).voltage_v(scanned_protocol(device.board, None, "sim"))[UNTOUCHED:]
+            for one in (pressed_scene, scene())
+        )
+        device.start_scene()
+        stream = device.stream(Stream.RAW)
+        volts = [next(stream).voltage_v]
+        device.transport.press([(30.0, -20.0), (500.0, 0.0), (np.nan, 0.0)])
+        volts += [next(stream).voltage_v for _ in range(3)]
+        device.transport.press([])
+        volts += [next(stream).voltage_v for _ in range(2)]
+        stream.close()
+    near_v = 3e-5
+    assert np.abs(expected - alone).max() > 100 * near_v
+    for frame, is_pressed in enumerate([False, True, True, True, False, False]):
+        wanted = (expected if is_pressed else alone)[frame]
+        assert np.abs(volts[frame] - wanted).max() < near_v, frame
+
+
+def test_a_moving_scene_is_pressed_as_it_is_in_the_middle_of_a_scan():
+    path = TouchTrack((Keyframe(0.0, -40.0, 10.0, 9.0), Keyframe(0.45, 0.0, 10.0, 9.0)))
+    moving = SceneRows(replace(scene(), touches=(path,), elements=1500))
+    finger = TrueTouch(30.0, -20.0, FINGER_MM, 9.0)
+    frame = UNTOUCHED + 4
+    middle_s = 4 / moving.scene.rate_hz + moving.scene.scan_s / 2
+    x_mm = -40.0 + 40.0 * middle_s / 0.45
+    still = TouchTrack((Keyframe(-1e9, x_mm, 10.0, 9.0),), hold=True)
+    same = SceneRows(replace(scene(), touches=(still,), elements=1500))
+    change_v = np.abs(same.pressed(frame, (finger,)) - same.part(range(frame, frame + 1))[0]).max()
+    apart_v = np.abs(moving.pressed(frame, (finger,)) - same.pressed(frame, (finger,))).max()
+    assert apart_v < 0.1 * change_v
 
 
 def test_a_faster_scan_sees_scene_frames_more_than_once():

@@ -77,6 +77,14 @@ class Page:
         """What an element says."""
         return str(self.get(name))
 
+    def shown(self, name: str) -> bool:
+        """Whether an element is drawn."""
+        return bool(self.get(name, "checkVisibility()"))
+
+    def box(self, name: str) -> dict[str, float]:
+        """Where an element is in the window, in CSS pixels."""
+        return dict(self.get(name, "getBoundingClientRect().toJSON()"))
+
     def click(self, name: str) -> None:
         """Press it, and see to it that the old answer is gone."""
         self.run(

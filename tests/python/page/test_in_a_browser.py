@@ -3,6 +3,7 @@ browser for all tests."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -127,6 +128,33 @@ def test_recorded(scene, page, tmp_path):
         until(lambda: server.reader.frames == 2 * count)
 
 
+def test_a_recording_has_a_timeline_and_can_be_saved(scene, page, tmp_path):
+    """Forwards while it plays, back from its end; the bytes that are saved are the recording's."""
+    path, saved = tmp_path / "run.eits", tmp_path / "saved"
+    with Session(f"sim:{scene}?loop=1", SessionSettings(ALL, frames=96, record=path)) as session:
+        for _ in session.messages():
+            pass
+    with serving(f"file:{path}") as server:
+        page.open(server)
+        until(lambda: page.shown("timeline"))
+        length_s = float(page.get("at", "max"))
+        assert length_s == pytest.approx(95 / 48, abs=0.01)
+        page.choose("at", "1.5")
+        assert page.answer() == "from 1.5 s"
+        until(lambda: float(page.text("n-time").split()[0]) >= 1.5)
+        assert server.reader.frames < 70
+        until(lambda: page.text("state") == "over")
+        page.choose("at", "1.9")
+        assert page.answer() == "from 1.9 s"
+        until(lambda: page.text("state") == "over" and page.text("n-time") == f"{length_s:.2f} s")
+        assert page.text("at-text") == f"{length_s:.1f} of {length_s:.1f} s"
+        page.command("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(saved))
+        page.click("download")
+        until(lambda: page.text("answer") == "saved run.eits")
+        until(lambda: (saved / "run.eits").exists())
+        assert (saved / "run.eits").read_bytes() == path.read_bytes()
+
+
 def test_lines_of_an_instrument(scene, page, tmp_path):
     rows = BoardFrames(load_scene(scene)).voltage_v(adjacent(16))
     text = "\n".join(",".join(map(repr, row)) for row in rows.tolist())
@@ -199,6 +227,9 @@ def test_tare_solver_and_mode(live, server):
     live.click("undo")
     assert live.answer() == "the reference before the last tare is back"
     until(lambda: live.touches() and live.get("undo", "hidden"))
+    assert not live.shown("sign")
+    live.run("document.getElementById('expert').open = true")
+    assert live.shown("sign")
     live.choose("sign", "decrease")
     assert live.answer() == "solver: sign decrease"
     until(lambda: not live.touches())  # they are increases
@@ -245,6 +276,7 @@ def test_record(live, server):
     live.click("record")
     assert live.answer().endswith(name)
     until(lambda: live.text("record-text") == "Record")
+    assert live.shown("download")
     with Session(f"file:{server.reader.folder / name}", SessionSettings(ALL)) as session:
         assert sum(1 for _ in session.messages()) > 2
 
@@ -291,17 +323,83 @@ def test_unplugged_and_back(scene, page, monkeypatch):
 
 
 @pytest.mark.parametrize("width", [360, 768, 2560])
-def test_it_fits(live, width):
+@pytest.mark.parametrize("settings", [False, True])
+def test_it_fits(live, width, settings):
     live.size(width, 900)
+    live.run(f"document.getElementById('expert').open = {str(settings).lower()}")
     until(lambda: live.run("return innerWidth") == width)
     wide, inner = live.run("return [document.documentElement.scrollWidth, innerWidth]")
     assert wide <= inner
     outside = live.run(
         "return [...document.querySelectorAll('button, input, select, canvas, h2, dd')].filter(e =>"
-        " e.getClientRects().length && (e.getBoundingClientRect().right > innerWidth + 0.5 ||"
+        " e.checkVisibility() && (e.getBoundingClientRect().right > innerWidth + 0.5 ||"
         " e.getBoundingClientRect().left < -0.5)).map(e => e.id)"
     )
     assert outside == []
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (2560, 1440)])
+def test_skin_plots_and_voltages_are_on_one_screen(live, width, height):
+    live.size(width, height)
+    until(lambda: live.run("return innerWidth") == width)
+    until(lambda: live.get("volts", "width") > 300)
+    for name in ("skin", "plots", "volts"):
+        box = live.box(name)
+        assert box["top"] >= 0 and box["bottom"] <= height and box["height"] >= 100, name
+    assert live.run("return document.documentElement.scrollHeight") <= height
+    assert live.box("skin")["height"] >= 0.4 * height
+
+
+def test_a_phone_shows_the_skin_below_its_toolbar(live):
+    live.size(390, 844)
+    until(lambda: live.run("return innerWidth") == 390)
+    box = live.box("skin")
+    assert box["top"] < 0.25 * 844
+    assert box["bottom"] < 0.75 * 844
+    assert box["height"] >= 0.9 * box["width"]
+
+
+def place_on_screen(page: Page, x_mm: float, y_mm: float) -> tuple[float, float]:
+    """Where the skin's canvas shows a place, in CSS pixels from the window's corner."""
+    box = page.box("skin")
+    scale = min(box["width"] - 52, box["height"] - 52) / 194
+    middle = box["left"] + box["width"] / 2, box["top"] + box["height"] / 2
+    return middle[0] + x_mm * scale, middle[1] - y_mm * scale
+
+
+def test_the_mouse_presses_the_simulated_skin(live):
+    """The press is found where it is, moves with the mouse, and ends with it."""
+    assert live.shown("hint")
+
+    def found_at(place: tuple[float, float]) -> bool:
+        found, expected = live.touches(), sorted([*PLACES, place])
+        return len(found) == 3 and float(np.abs(np.array(found) - expected).max()) < NEAR_MM
+
+    def mouse(kind: str, place: tuple[float, float]) -> None:
+        x, y = place_on_screen(live, *place)
+        live.command("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    for kind, place in (("mousePressed", (0.0, 40.0)), ("mouseMoved", (5.0, 45.0))):
+        mouse(kind, place)
+        until(partial(found_at, place))
+    until(lambda: "touches" in live.get("plots", "ariaLabel"))
+    mouse("mouseReleased", (5.0, 45.0))
+    until(lambda: len(live.touches()) == 2)
+
+
+def test_keys_press_and_a_page_that_goes_lifts_its_finger(live, server):
+    def press_key(key: str) -> None:
+        event = f"new KeyboardEvent('keydown', {{key: '{key}'}})"
+        live.run(f"document.getElementById('skin').dispatchEvent({event})")
+
+    press_key("Enter")
+    until(lambda: len(live.touches()) == 3)
+    board = server.reader.live().device.transport.board  # type: ignore[attr-defined]
+    assert [(one.x_mm, one.y_mm) for one in board.fingers] == [(0.0, 0.0)]
+    press_key("ArrowUp")
+    until(lambda: [(one.x_mm, one.y_mm) for one in board.fingers] == [(0.0, 5.0)])
+    live.driver.get("about:blank")
+    until(lambda: board.fingers == ())
 
 
 def test_light_and_dark(live):
@@ -317,6 +415,7 @@ def test_light_and_dark(live):
 
 
 def test_every_control_has_a_name_and_is_reached_by_keyboard(live):
+    live.run("document.getElementById('expert').open = true")
     nodes = live.command("Accessibility.getFullAXTree")["nodes"]
     roles = ("button", "checkbox", "combobox", "spinbutton", "image", "table", "toolbar")
     found = [
@@ -330,7 +429,7 @@ def test_every_control_has_a_name_and_is_reached_by_keyboard(live):
     assert unnamed == []
     reached = live.run(
         "return [...document.querySelectorAll('button, input, select')].filter(e =>"
-        " e.getClientRects().length && !e.disabled && e.tabIndex < 0).map(e => e.id)"
+        " e.checkVisibility() && !e.disabled && e.tabIndex < 0).map(e => e.id)"
     )
     assert reached == []
 

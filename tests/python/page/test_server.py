@@ -26,7 +26,7 @@ from eitskin.device.client import Device
 from eitskin.device.wire.link_table import Stream
 from eitskin.page.facts import HEAD, MAGIC
 from eitskin.page.hub import IN_FLIGHT, Hub, Outgoing, PageClient
-from eitskin.page.server import MAX_WAITING, NO_TOKEN, PageServer
+from eitskin.page.server import FILES, MAX_WAITING, NO_TOKEN, PageServer
 from eitskin.session import session as session_module
 from fresh_python import INTERRUPTIBLE
 from line_of_a_board import Line
@@ -81,7 +81,7 @@ def got(server: PageServer, path: str, **headers: str) -> tuple[int, dict[str, s
 
 
 def test_files_say_that_nothing_else_may_be_loaded(server):
-    for path in ("/", "/page.js", "/drawing.js", "/page.css", "/icon.svg"):
+    for path in FILES:
         status, headers, content = got(server, path)
         assert status == 200
         assert content
@@ -158,7 +158,10 @@ def test_a_page_that_talks_nonsense_is_let_go(server, said):
                 line.recv(10)
 
 
-@pytest.mark.parametrize("what", ["fly", "preset", "sign", "iterations", "mode", "speed"])
+ORDERS = ["fly", "preset", "sign", "iterations", "mode", "speed", "press", "seek"]
+
+
+@pytest.mark.parametrize("what", ORDERS)
 def test_an_order_that_cannot_be_is_answered(server, what):
     with opened(server, TOKEN) as line:
         line.send(json.dumps({"type": "do", "do": what, "value": ["x"]}))
@@ -330,3 +333,42 @@ def test_a_tare_under_a_finger_is_refused_then_taken_and_undone(tmp_path):
         assert ask("undo-tare") == (True, "the reference before the last tare is back", False)
         ok, text, _ = ask("undo-tare")
         assert not ok and "does not keep" in text
+
+
+@pytest.mark.parametrize(
+    "value",
+    [None, "x", [1.0, 2.0], [[1.0]], [[1.0, None]], [[1.0, True]], [[1e9, 0.0]], [[0.0, 0.0]] * 6],
+)
+def test_a_press_that_cannot_be_is_refused(server, value):
+    with opened(server, TOKEN) as line:
+        name = reported(line, "setup")["skins"][0]["source"]
+        for one in (value, {name: value}, {"another": []}):
+            line.send(json.dumps({"type": "do", "do": "press", "value": one}))
+            answer = reported(line, "answer")
+            assert not answer["ok"] and "press" in answer["text"]
+    assert server.reader.live().device.transport.board.fingers == ()
+
+
+def test_a_real_board_is_not_pressed_and_has_no_timeline(monkeypatch):
+    monkeypatch.setattr(session_module, "open_with_files", lambda *files, **how: Device(Line()))
+    with serving("serial:fake", Stream.RAW) as server, opened(server, TOKEN) as line:
+        (skin,) = reported(line, "setup")["skins"]
+        name = skin["source"]
+        assert skin["finger_mm"] is None
+        line.send(json.dumps({"type": "do", "do": "press", "value": {name: [[0, 0]]}}))
+        answer = reported(line, "answer")
+        assert not answer["ok"] and "only the skin of  sim:  can be pressed" in answer["text"]
+        line.send(json.dumps({"type": "do", "do": "seek", "value": 1}))
+        answer = reported(line, "answer")
+        assert not answer["ok"] and "is no recording" in answer["text"]
+
+
+def test_a_recording_needs_the_token_and_must_be_there(server):
+    assert got(server, "/recording")[0] == 401
+    request = urllib.request.Request(
+        f"http://127.0.0.1:{server.port}/recording", headers={"X-Eitskin-Token": TOKEN}
+    )
+    with pytest.raises(urllib.error.HTTPError) as error:
+        urllib.request.urlopen(request, timeout=10)
+    assert error.value.code == 404
+    assert "nothing has been recorded here yet" in json.loads(error.value.read())["error"]

@@ -15,7 +15,7 @@ from eitskin.scene.session import MeshCache
 EXPECTED = {
     "single_press", "light_press", "two_touch", "pinch", "swipe", "ring7", "roll", "rotate", "grip",
     "drying_gel", "resting_hand", "loose_electrode", "bridged", "mains_hum", "drift", "real_board",
-    "random_touches", "demo", "two_fingers",
+    "random_touches", "demo", "two_fingers", "play",
     "tap", "double_tap", "hold", "swipe_right", "swipe_up", "swipe_left", "swipe_down", "spread",
     "drum_beat", "ring_turn", "page_turns", "hydrogel",
 }  # fmt: skip

@@ -8,10 +8,11 @@ import pytest
 
 from eitskin.cli.main import main
 from eitskin.device.wire.link_table import Stream
-from eitskin.errors import DeviceError
+from eitskin.errors import DeviceError, UsageError
 from eitskin.frames.frames import save_frames
 from eitskin.session.frame import Frame, Notice
 from eitskin.session.message import schema
+from eitskin.session.replay import recording_length_s
 from eitskin.session.sample import SIZE, Sample
 from eitskin.session.session import Session
 from eitskin.session.settings import SessionSettings
@@ -110,3 +111,30 @@ def test_a_recording_is_asked_too_and_says_no(tmp_path):
         with pytest.raises(DeviceError, match="is a recording"):
             answers[0].result()
     assert count == 6
+
+
+def test_a_recording_goes_on_where_it_is_asked_to(tmp_path):
+    """Forwards, back, and to one frame while it is paused; each frame is what it was."""
+    path = tmp_path / "run.eits"
+    settings = SessionSettings(mode=Stream.TOUCHES, record=path, frames=20)
+    with Session("sim:swipe", settings) as session:
+        recorded = [one.touches for one in session.messages() if isinstance(one, Frame)]
+    with Session(f"file:{path}") as session:
+        assert recording_length_s(session.device) == pytest.approx(0.95, abs=0.01)
+    numbers: list[int] = []
+    with Session(f"file:{path}") as session:
+        asked = {2: 0.6, 4: 0.2, 6: 0.95}  # after so many frames
+        for message in session.messages():
+            assert isinstance(message, Frame)
+            numbers.append(round(20 * message.time_s))
+            assert message.touches == recorded[numbers[-1]]
+            if (time_s := asked.get(len(numbers))) is not None:
+                if len(numbers) == 6:
+                    session.pacer.pause()
+                session.ask(lambda device, at=time_s: session.seek(at))
+    assert numbers == [0, 1, 12, 13, 4, 5, 19]
+
+
+def test_only_a_recording_goes_on_elsewhere():
+    with Session("sim:swipe") as session, pytest.raises(UsageError, match="is no recording"):
+        session.seek(1.0)

@@ -4,7 +4,14 @@ const AHEAD_S = 0.05;
 const TRAIL_S = 1.5;
 const PLACE_90 = 4.605; // chi-squared of two numbers that 90 % lie below
 
-function colour(name) {
+const ID_COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7b4fa3"];
+
+// The colour of a touch in the table, on the skin and in the plots; told apart by colour-blind eyes.
+export function idColour(id) {
+  return ID_COLOURS[(id - 1) % ID_COLOURS.length] || ID_COLOURS[0];
+}
+
+export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
@@ -14,7 +21,7 @@ function channels(hex) {
 }
 
 // A canvas as large as it is shown, in device pixels; its context counts in CSS pixels.
-function fitted(canvas) {
+export function fitted(canvas) {
   const ratio = window.devicePixelRatio || 1;
   const width = canvas.clientWidth, height = canvas.clientHeight;
   const wide = Math.max(1, Math.round(width * ratio)), high = Math.max(1, Math.round(height * ratio));
@@ -96,7 +103,8 @@ export class SkinDrawing {
       context.fillStyle = this.colours.soft;
       context.font = "15px system-ui, sans-serif";
       context.textAlign = "center";
-      context.fillText("waiting for the board, or its model is not known here", width / 2, height / 2);
+      context.fillText("waiting for the board,", width / 2, height / 2 - 10);
+      context.fillText("or its model is not known here", width / 2, height / 2 + 10);
       return;
     }
     this.place(width, height);
@@ -112,11 +120,29 @@ export class SkinDrawing {
     this.drawZones(context, options.zones, options.pressed);
     this.drawElectrodes(context, options.health);
     if (options.teach) this.drawPlaces(context, options.teach);
+    for (const place of options.fingers) this.drawFinger(context, place, options.finger_mm);
     if (!frame) return;
     if (options.trails) this.drawTrails(context, frame.message.time_s);
     if (options.truth) for (const touch of frame.message.true || []) this.drawTrue(context, touch);
     for (const touch of frame.message.touches || []) this.drawTouch(context, touch);
     for (const touch of (options.report || {}).touches || []) this.drawMoving(context, touch);
+  }
+
+  // The place in mm at a point of the canvas, in CSS pixels.
+  placeAt(x, y) {
+    if (!this.skin || !this.scale) return null;
+    const [x0, y0, x1, y1] = this.box, { clientWidth: width, clientHeight: height } = this.canvas;
+    return [(x0 + x1) / 2 + (x - width / 2) / this.scale, (y0 + y1) / 2 - (y - height / 2) / this.scale];
+  }
+
+  // a finger that this page presses
+  drawFinger(context, [x, y], radius_mm) {
+    context.fillStyle = this.colours.ink;
+    context.globalAlpha = 0.18;
+    context.beginPath();
+    context.arc(this.x(x), this.y(y), radius_mm * this.scale, 0, 2 * Math.PI);
+    context.fill();
+    context.globalAlpha = 1;
   }
 
   // where a touch after a drive will be in AHEAD_S
@@ -220,8 +246,8 @@ export class SkinDrawing {
 
   drawTrails(context, time) {
     context.lineCap = "round";
-    context.strokeStyle = this.colours.touch;
-    for (const trail of this.trails.values()) {
+    for (const [id, trail] of this.trails) {
+      context.strokeStyle = idColour(id);
       for (let k = 1; k < trail.length; ++k) {
         const fresh = 1 - (time - trail[k].t) / TRAIL_S;
         context.globalAlpha = Math.max(0, 0.7 * fresh);
@@ -253,9 +279,11 @@ export class SkinDrawing {
     context.stroke();
     context.setLineDash([]);
     if (touch.x_variance_mm2) this.drawEllipse(context, touch, x, y);
+    context.fillStyle = idColour(touch.id);
     context.beginPath();
-    context.arc(x, y, 3.5, 0, 2 * Math.PI);
+    context.arc(x, y, 4, 0, 2 * Math.PI);
     context.fill();
+    context.fillStyle = this.colours.touch;
     const words = touch.force_n ? `${touch.id}  ${touch.force_n.toFixed(1)} N` : String(touch.id);
     context.font = "700 14px system-ui, sans-serif";
     context.textAlign = "left";
@@ -319,8 +347,8 @@ export class VoltsDrawing {
     }
     context.textAlign = "left";
     context.textBaseline = "alphabetic";
-    const times = known && apart > 0 ? `; difference ${enlarged.toPrecision(2)} times enlarged, at most ${(1e3 * apart).toPrecision(3)} mV` : "";
-    context.fillText(`${volts.length} rows of the protocol${times}`, left, height - 4);
+    const times = known && apart > 0 ? `; difference at most ${(1e3 * apart).toPrecision(3)} mV, drawn ${enlarged.toPrecision(2)} times` : "";
+    context.fillText(`${volts.length} rows${times}`, left, height - 4);
     const line = (value, name, wide) => {
       context.strokeStyle = colour(name);
       context.lineWidth = wide;

@@ -1,18 +1,23 @@
 // The live page: takes what the server sends, draws the newest frame, and says what the user wants.
-import { SkinDrawing, VoltsDrawing } from "./drawing.js";
+import { SkinDrawing, VoltsDrawing, idColour } from "./drawing.js";
+import { PlotsDrawing } from "./plots.js";
 
 const $ = (id) => document.getElementById(id);
 const MAGIC = 0x31465645; // "EVF1"
 const WORDS_MS = 2500; // between two texts for screen readers
 const SHOWN_LOG = 60;
 const FINGERS = ["down", "move", "up"]; // told by the touches themselves
+const STEP_MM = 5; // of a finger that the arrow keys move
+const MAX_FINGERS = 5; // that may press at once
 const GESTURE_MS = 4000; // that a gesture stays to be read
 
 const skin = new SkinDrawing($("skin"));
+const plots = new PlotsDrawing($("plots"));
 const volts = new VoltsDrawing($("volts"));
 const page = {
   socket: null, setup: null, frame: null, asked: false, times: [], health: {}, dropped: 0, skipped: 0,
   wordsAt: 0, words: "", gestures: [], pressed: new Set(), state: "", teach: null,
+  fingers: new Map(), pressing: false, pressAgain: false, seeking: false,
 };
 const token = new URLSearchParams(location.hash.slice(1)).get("token");
 
@@ -21,7 +26,10 @@ const token = new URLSearchParams(location.hash.slice(1)).get("token");
 function connect() {
   const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
   socket.binaryType = "arraybuffer";
-  socket.onopen = () => socket.send(JSON.stringify({ type: "hello", token }));
+  socket.onopen = () => {
+    page.pressing = false;
+    socket.send(JSON.stringify({ type: "hello", token }));
+  };
   socket.onmessage = ({ data }) => (typeof data === "string" ? take(JSON.parse(data)) : takeFrame(data));
   socket.onclose = ({ code, reason }) => {
     if (code === 4401) return setState("failed", `${reason}: open the address that eitskin view printed`);
@@ -52,9 +60,7 @@ function takeFrame(buffer) {
     message: JSON.parse(text),
   };
   const { message } = page.frame;
-  page.times.push(performance.now());
-  while (page.times.length > 2 && page.times[0] < performance.now() - 2000) page.times.shift();
-  skin.follow(message.touches || [], message.time_s);
+  follow(message);
   for (const event of message.events || []) {
     if (event.zone && event.kind === "press") page.pressed.add(event.zone);
     if (event.zone && event.kind === "release") page.pressed.delete(event.zone);
@@ -62,6 +68,15 @@ function takeFrame(buffer) {
   }
   page.gestures = page.gestures.filter((event) => performance.now() - event.at < GESTURE_MS).slice(0, 4);
   soon();
+}
+
+function follow(message) {
+  const { times } = page, last = times[times.length - 1];
+  if (last && message.time_s < last.time_s) times.length = 0;
+  times.push({ at: performance.now(), frame: message.frame, time_s: message.time_s });
+  while (times.length > 2 && times[0].at < performance.now() - 2000) times.shift();
+  skin.follow(message.touches || [], message.time_s);
+  plots.follow(message.touches || [], message.time_s);
 }
 
 // touches after a drive, newer than the newest frame
@@ -120,7 +135,14 @@ function takeSetup(setup) {
     box.disabled = !board;
     box.checked = setup.mode.includes(box.value);
   }
-  for (const id of ["play", "step", "speed"]) $(id).disabled = !may;
+  for (const id of ["play", "step", "speed", "at"]) $(id).disabled = !may;
+  const pressable = may && Boolean(setup.skins[0].finger_mm) && Boolean(setup.skin);
+  $("hint").hidden = !pressable;
+  $("skin").classList.toggle("pressable", pressable);
+  if (!pressable) page.fingers.clear();
+  $("timeline").hidden = !setup.length_s;
+  if (setup.length_s) $("at").max = setup.length_s;
+  if (setup.replays) $("download").hidden = !may;
   $("step").hidden = $("speed").parentElement.hidden = !setup.timed;
   const speed = setup.speed === 0 ? "max" : String(setup.speed);
   if (![...$("speed").options].some((one) => one.value === speed)) $("speed").add(new Option(`${speed} ×`, speed));
@@ -145,7 +167,9 @@ function showPlay() {
   if (over) $("play").disabled = Boolean(setup) && !setup.may_command;
 }
 
-function answer({ ok, text }) {
+function answer({ ok, text, do: what }) {
+  if (what === "press") return pressAnswered(ok, text);
+  if (what === "record" && ok && text.startsWith("recorded")) $("download").hidden = false;
   $("answer").textContent = text;
   $("answer").dataset.ok = String(ok);
 }
@@ -155,6 +179,7 @@ function note({ kind, text, time_s }) {
   what.textContent = time_s === null || time_s === undefined ? `${kind}: ` : `${time_s.toFixed(1)} s ${kind}: `;
   item.append(what, text);
   $("log").prepend(item);
+  $("log-none").hidden = true;
   while ($("log").children.length > SHOWN_LOG) $("log").lastChild.remove();
 }
 
@@ -187,6 +212,7 @@ function showTouches(touches) {
   const rows = touches.map((touch) => {
     const row = document.createElement("tr");
     row.dataset.id = touch.id;
+    row.style.setProperty("--id", idColour(touch.id));
     const sure = touch.confidence === null ? "–" : `${Math.round(100 * touch.confidence)} %`;
     row.append(cell(touch.id), cell(touch.x_mm.toFixed(1)), cell(touch.y_mm.toFixed(1)), cell(touch.radius_mm.toFixed(1)),
       cell(touch.force_n ? touch.force_n.toFixed(2) : "–"), cell(sure));
@@ -234,17 +260,21 @@ function healthOf(info) {
   return health;
 }
 
-function rate() {
-  const { times } = page;
-  return times.length > 1 ? ((times.length - 1) * 1000) / (times[times.length - 1] - times[0]) : null;
+// Frames per second of the board's clock, and drawn here per second.
+function rates() {
+  const { times } = page, first = times[0], last = times[times.length - 1];
+  if (times.length < 2 || last.time_s <= first.time_s || last.at <= first.at) return [];
+  return [(last.frame - first.frame) / (last.time_s - first.time_s), ((times.length - 1) * 1000) / (last.at - first.at)];
 }
 
 function draw() {
   const { frame, setup } = page;
   skin.draw(frame, { report: page.report, health: page.health, trails: $("trails").checked, truth: $("truth").checked,
-    zones: setup ? setup.zones : [], pressed: page.pressed, teach: page.teach });
+    zones: setup ? setup.zones : [], pressed: page.pressed, teach: page.teach,
+    fingers: page.fingers.values(), finger_mm: setup ? setup.skins[0].finger_mm : 0 });
   if (!frame || !setup) return;
   const { message } = frame, { info } = message, touches = message.touches || [];
+  $("plots").ariaLabel = plots.draw(skin.box);
   $("volts").ariaLabel = volts.draw(frame.volts, setup.reference_v);
   showElectrodes(healthOf(info), setup.electrodes);
   showTouches(touches);
@@ -253,13 +283,20 @@ function draw() {
   $("gestures").hidden = !page.gestures.length;
   $("n-frame").textContent = String(message.frame);
   $("n-time").textContent = `${message.time_s.toFixed(2)} s`;
-  const hz = rate();
-  $("n-rate").textContent = hz === null ? "–" : `${hz.toFixed(1)} Hz`;
+  [$("n-rate").textContent, $("n-shown").textContent] = [0, 1].map((k) => rates()[k] ? `${rates()[k].toFixed(1)} Hz` : "–");
+  showTime(message.time_s, setup.length_s);
   const solve_us = info ? info.solve_us + info.touch_us : 0;
   $("n-solve").textContent = solve_us ? `${(solve_us / 1e3).toFixed(1)} ms` : "–";
   $("scale-low").textContent = `−${skin.peak.toPrecision(2)}`;
   $("scale-high").textContent = `+${skin.peak.toPrecision(2)}`;
   sayTouches(touches);
+}
+
+function showTime(time_s, length_s) {
+  if (!length_s) return;
+  const at = page.seeking ? Number($("at").value) : time_s > length_s ? time_s % length_s : time_s;
+  if (!page.seeking) $("at").value = at;
+  $("at-text").textContent = `${at.toFixed(1)} of ${length_s.toFixed(1)} s`;
 }
 
 // Touches in words, seldom enough to be listened to.
@@ -275,6 +312,56 @@ function sayTouches(touches) {
   page.wordsAt = now;
   $("words").textContent = words;
 }
+
+// ---- a finger on a simulated skin ----
+
+// The newest places only, and one message at a time.
+function press() {
+  soon();
+  page.pressAgain = page.pressing;
+  if (page.pressing) return;
+  page.pressing = true;
+  send({ type: "do", do: "press", value: { [page.setup.skins[0].source]: [...page.fingers.values()].slice(0, MAX_FINGERS) } });
+}
+
+function pressAnswered(ok, text) {
+  page.pressing = false;
+  if (!ok) answer({ ok, text });
+  if (page.pressAgain) press();
+}
+
+function moveFinger(id, place) {
+  if (!place || !$("skin").classList.contains("pressable")) return;
+  page.fingers.set(id, place);
+  press();
+}
+
+function liftFinger(id) {
+  if (page.fingers.delete(id)) press();
+}
+
+const placeOf = (event) => skin.placeAt(event.offsetX, event.offsetY);
+$("skin").addEventListener("pointerdown", (event) => {
+  if (event.button) return;
+  moveFinger(event.pointerId, placeOf(event));
+});
+$("skin").addEventListener("pointermove", (event) => {
+  if (page.fingers.has(event.pointerId)) moveFinger(event.pointerId, placeOf(event));
+});
+for (const end of ["pointerup", "pointercancel", "pointerleave"]) $("skin").addEventListener(end, (event) => liftFinger(event.pointerId));
+addEventListener("blur", () => {
+  page.fingers.clear();
+  press();
+});
+$("skin").addEventListener("keydown", (event) => {
+  const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+  const place = page.fingers.get("keys"), size = $("skin");
+  if (event.key === "Escape" || (event.key === "Enter" && place)) liftFinger("keys");
+  else if (event.key === "Enter") moveFinger("keys", skin.placeAt(size.clientWidth / 2, size.clientHeight / 2));
+  else if (step && place) moveFinger("keys", place.map((at, k) => at + STEP_MM * step[k]));
+  else return;
+  event.preventDefault();
+});
 
 // ---- what is wanted ----
 
@@ -306,6 +393,29 @@ $("model").addEventListener("change", async () => {
     answer({ ok: false, text: `the upload did not arrive: ${error.message}` });
   }
   $("model").value = "";
+});
+$("at").addEventListener("input", () => {
+  page.seeking = true;
+  soon();
+});
+$("at").addEventListener("change", () => {
+  page.seeking = false;
+  ask("seek", Number($("at").value));
+});
+$("download").addEventListener("click", async () => {
+  answer({ ok: true, text: "fetching the recording" });
+  try {
+    const reply = await fetch("/recording", { headers: { "X-Eitskin-Token": token || "" } });
+    if (!reply.ok) throw new Error((await reply.json()).error);
+    const link = document.createElement("a");
+    link.download = /filename="([^"]+)"/.exec(reply.headers.get("content-disposition") || "")?.[1] || "recording.eits";
+    link.href = URL.createObjectURL(await reply.blob());
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    answer({ ok: true, text: `saved ${link.download}` });
+  } catch (error) {
+    answer({ ok: false, text: `the recording did not come: ${error.message}` });
+  }
 });
 for (const id of ["truth", "trails"]) $(id).addEventListener("change", soon);
 addEventListener("resize", soon);
