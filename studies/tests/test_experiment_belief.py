@@ -1,10 +1,12 @@
 """The study of belief: confidence, places and counts of every set, and numbers by hand."""
 
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
+from eitskin.skin.protocol import adjacent
+from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments import belief
 from eitskin_studies.experiments.belief.tables import counts, coverage, curve
 from eitskin_studies.experiments.experiment import ExperimentOutcome
@@ -44,3 +46,20 @@ def test_every_set_is_seen_and_a_finished_run_fills_its_page(tmp_path):
     goes_on(run, outcome)
     page = fills_its_page(outcome, "belief", tmp_path)
     assert "expected calibration error" in page
+
+
+def test_each_set_is_looked_at_with_its_own_sign():
+    class Finder:
+        diagnostics: tuple[str, ...] = ()
+        signs: ClassVar[list[str | None]] = []
+
+        def look_for(self, sign: str | None) -> None:
+            self.signs.append(sign)
+
+        def __call__(self, *_: Any) -> tuple[()]:
+            return ()
+
+    factory = WorldFactory(paper_skin(), adjacent(16), elements=2000)
+    for name in ("insulating_touches", "discs_1_to_3"):
+        belief.frames_of(Finder(), factory.scenes(name, 1, 1, family="judging"))
+    assert Finder.signs == ["both", None]

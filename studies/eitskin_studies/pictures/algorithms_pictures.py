@@ -119,7 +119,7 @@ def draw_curves(path: Path, *, results: Sequence[AlgorithmResult]) -> None:
         figure = matplotlib.figure.Figure(figsize=(11.5, 5.0), layout="constrained")
         left, right = figure.subplots(1, 2, sharey=True)
         for axes, fixed in ((left, True), (right, False)):
-            for k, one in enumerate(results):
+            for k, one in enumerate(_kept(results)):
                 curve = one.curve(fixed)
                 (line,) = axes.plot(THRESHOLDS, curve, **_line(one, k), label=one.candidate.name)
                 t = FIXED_THRESHOLD if fixed else one.chosen.threshold

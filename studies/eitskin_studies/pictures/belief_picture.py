@@ -11,7 +11,7 @@ SMALLEST = 1e-3
 
 
 def draw_belief(path: Path, sets: Sets) -> None:
-    """Left the share of touches that are none over what is said of them, both logarithmic; right
+    """Left the share of false touches over what their confidence says, both logarithmic; right
     the coverage of each set's ellipses.
 
     Raises:
@@ -35,7 +35,8 @@ def draw_belief(path: Path, sets: Sets) -> None:
             xscale="log",
             yscale="log",
             xlabel="1 - confidence",
-            ylabel="share of touches that are none",
+            ylabel="share of reported touches that are false",
+            title="Is the confidence true?",
             xlim=(SMALLEST, 1),
             ylim=(SMALLEST, 1),
         )
@@ -45,5 +46,9 @@ def draw_belief(path: Path, sets: Sets) -> None:
             right.plot(100 * one.mean, place, "o", color=FOUND, markersize=4)
         right.set_yticks(range(len(covered)), [in_words(name) for name, _ in covered])
         right.invert_yaxis()
-        right.set(xlabel="true places in their 90 % ellipses, %", xlim=(0, 100))
+        right.set(
+            xlabel="true places in their 90 % ellipses, %",
+            xlim=(0, 100),
+            title="Is the place's 90 % ellipse true? (band: 87 to 93 %)",
+        )
         save_picture(figure, path)

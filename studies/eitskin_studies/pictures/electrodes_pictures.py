@@ -76,7 +76,7 @@ def draw_counts(path: str | Path, bars: Sequence[Bar]) -> None:
             one.set_xlabel(label)
             one.spines[["top", "right"]].set_visible(False)
         axes[0].legend(frameon=False, loc="best")
-        axes[2].legend(frameon=False, loc="upper left", fontsize=7.5)
+        axes[2].legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7.5)
         for one in axes[1:]:
             one.set_ylim(-4, 104)
         save_picture(figure, path)

@@ -64,7 +64,7 @@ def draw_skin(
     judged: dict[tuple[str, float], Anywhere],
     snr_db: float,
 ) -> None:
-    """Each place's error, the mean over the loads, before and after calibration, for the paper's
+    """Each place's error, the mean over the weights, before and after calibration, for the paper's
     reading and for the touch.
 
     Raises:
@@ -94,7 +94,8 @@ def draw_skin(
             axes.set_aspect("equal")
             axes.set_axis_off()
             axes.set_title(
-                f"{name}\n{kind}, mean of {len(WEIGHTS_G)} loads: {np.nanstd(errors, ddof=1):.1f} %"
+                f"{name}\n{kind}, mean of {len(WEIGHTS_G)} weights:"
+                f" {np.nanstd(errors, ddof=1):.1f} %"
             )
             if kind == "calibrated":
                 figure.colorbar(

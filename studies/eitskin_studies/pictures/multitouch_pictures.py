@@ -27,7 +27,6 @@ from eitskin_studies.pictures.comparison_pictures import truth_marks
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-PAPER_TOUCHES = 7
 SNR_COLOURS = {40.0: "#b26a00", 60.0: "#00796b", 80.0: "#283593"}
 CLASSICAL_COLOURS = ("#9e9e9e", "#5d4037", "#c2185b")
 TITLES = {RING: "ring of 60 mm", WIDE: "random, 4 radii apart", NARROW: "random, 2.5 radii apart"}
@@ -63,8 +62,6 @@ def draw_counts(path: str | Path, counted: CountedScenes) -> None:
                               if (geometry, k, name, snr_db) in counted.scores]  # fmt: skip
                     if points:
                         _line(axes, points, (place - len(lines) / 2) * 0.06, colour, label)
-                axes.axvline(PAPER_TOUCHES, color=INK, linewidth=0.8, linestyle=":", zorder=0)
-                axes.text(PAPER_TOUCHES + 0.1, 1.035, "paper: 7", fontsize=8, va="bottom")
                 axes.set(
                     xlabel="touches" if row == len(NAMES) - 1 else "",
                     ylim=(-0.03, 1.12),

@@ -62,7 +62,7 @@ def draw_stream_told(
         for axis in axes[-1]:
             axis.set_xlabel("frame")
         fingers = (
-            f"Touches reported of {len(stream.samples)} finger(s) at {stream.speed_mm_s:g} mm/s"
+            f"Touches reported for {len(stream.samples)} fingers at {stream.speed_mm_s:g} mm/s"
         )
         figure.suptitle(f"{fingers}, {note}; grey: true, a colour an id", fontsize=9.5)
         figure.tight_layout()

@@ -36,8 +36,8 @@ def draw_shares(path: Path, scores: Sequence[Mapping[str, Any]]) -> None:
         right.barh(place, one["false_per_scene"], color=colour)
     left.set_yticks(range(len(rows)), [in_words(one["name"]) for one in rows])
     left.invert_yaxis()
-    left.set(xlabel="scenes counted exactly, %", xlim=(0, 100))
-    right.set(xlabel="false touches a scene")
+    left.set(xlabel="scenes counted exactly, %", xlim=(0, 100), title="exact counts")
+    right.set(xlabel="false touches per scene", title=f"red: exact in fewer than {FAILS_BELOW:g} %")
     figure.savefig(path, dpi=DPI)
     plt.close(figure)
 

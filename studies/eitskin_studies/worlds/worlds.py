@@ -179,4 +179,4 @@ WORLDS: dict[str, World] = {
 
 def in_words(name: str) -> str:
     """Return the name of a world as a picture shows it."""
-    return name.replace("2_5_radii", "2.5_radii").replace("_", " ")
+    return name.replace("2_5_radii", "2.5_radii").replace("_percent", " %").replace("_", " ")

@@ -18,6 +18,8 @@ from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
 from everywhere import on_host
 from small_models import prebuilt
 
+LOST = {"noise": "More noise", "rows left out": "Rows left out", "bits": "Fewer bits"}
+PRECISION = ("Worse conditioned matrices", "Smaller changes")
 SHOWN = (  # group, which of it, sign looked for, title
     ("on an electrode", 0, "increase", "on an electrode"),
     ("centre", 0, "increase", "at the centre"),
@@ -81,6 +83,7 @@ def draw_losses(path: Path) -> None:
             axes.plot(LEVELS[kind][1:], values[1:], "o-", color="#1f6fb4")
             axes.set_ylim(0, 0.26)
             axes.set_xlabel(UNITS[kind], color=INK)
+            axes.set_title(LOST[kind])
         row[0].set_xscale("log")
         row[2].invert_xaxis()
 
@@ -95,7 +98,8 @@ def draw_precision(path: Path) -> None:
         ("size of the change, golden frame: 1", CHANGES, sizes, of_size),
     )
     with row_of(path, 2, 3.2, "float32 from float64,\nshare of the norm") as row:
-        for axes, (label, at, errors, lines) in zip(row, panels, strict=True):
+        for axes, (label, at, errors, lines), title in zip(row, panels, PRECISION, strict=True):
+            axes.set_title(title)
             for (name, said), style in zip(lines.items(), ("o-", "s--"), strict=True):
                 axes.loglog(at, [getattr(one, name) for one in errors], style, label=said)
             axes.set_xlabel(label, color=INK)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from eitskin.arrays import FloatArray
 from eitskin.model.build import linearise
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch, rim_distance_mm
@@ -24,15 +25,18 @@ from eitskin_studies.experiments.multitouch.counts import share
 from eitskin_studies.experiments.multitouch.variants import read_images
 from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.harness.sessions import FrameSession
+from eitskin_studies.pictures.weights_picture import draw_weights
 
 TITLE = "The paper, claim by claim; its weights placed one after another (Fig. 12)"
 
+PAPERS_MOST = 7  # weights that the paper tells apart
 MOST, RADIUS_MM, CONTRAST, FROM_RIM_MM, APART_MM = 12, 5.0, 5.0, 6.0, 30.0
 SNRS_DB, CLASSICAL_DB = (40.0, 60.0, 80.0), 60.0
 CONTACTS, NOISES = 4, 6  # so many sessions, so many frames of each scene in each
 # middles 6 mm from the boundary, and edges
 READINGS = {"middles 6 mm from the boundary": FROM_RIM_MM,
             "edges 6 mm from the boundary": FROM_RIM_MM + RADIUS_MM}  # fmt: skip
+SHOWN = "edges 6 mm from the boundary"  # of the picture
 # as the study of many touches chose them
 GAUSS_NEWTON, FISTA = (3e-6, 0.4), (0.003, 0.3)
 
@@ -78,10 +82,17 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             look = partial(_by_images, see, session)
             column = f"{method}, {CLASSICAL_DB:g} dB"
             exact.setdefault((name, column), []).extend(workspace.kept(facts, look))
+    seen = sessions[SHOWN, 0]
+    facts = {"part": "images", "set": seen.touches.name, "places": places[SHOWN]}
+    images = workspace.kept_arrays(facts, partial(_images, core, classical, seen))
+    panels = partial(
+        draw_weights, skin=skin, scenes=seen.touches.scenes[:PAPERS_MOST], images=images,
+        grids={"eitskin": model.grid, **dict.fromkeys(classical, setup.grid)},
+    )  # fmt: skip
     return ExperimentOutcome(
         (_table(exact),),
         {"places_mm": places, "exact": {f"{a}; {b}": values for (a, b), values in exact.items()}},
-        {},
+        {"weights.png": panels},
         {"sets": _words(contacts, seed)},
     )
 
@@ -123,6 +134,24 @@ def _by_core(core: Reconstructor, session: FrameSession, snr_db: float) -> list[
             touches = core.reconstruct(frame).touches
             found[-1].append(_exact(scene, [(one.x_mm, one.y_mm) for one in touches]))
     return found
+
+
+def _images(
+    core: Reconstructor, classical: dict[str, tuple[Method, float]], session: FrameSession
+) -> dict[str, FloatArray]:
+    """The images of one to ``PAPERS_MOST`` weights, each the first frame of its scene, at 60 dB."""
+    measured = session.measured(CLASSICAL_DB)
+    frames = measured.frames_v[:PAPERS_MOST, -1]
+    core.tare(measured.untouched_v)
+    shown = []
+    for frame in frames:
+        core.forget()
+        shown.append(np.asarray(core.reconstruct(frame).image, dtype=np.float64))
+    differences = frames - measured.untouched_v.mean(axis=0)
+    others = {
+        name: np.asarray(one.reconstruct(differences)) for name, (one, _) in classical.items()
+    }
+    return {"eitskin": np.array(shown), **others}
 
 
 def _by_images(see: Any, session: FrameSession) -> list[list[bool]]:
