@@ -6,7 +6,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from eitskin.arrays import FloatArray
+from eitskin.core.diagnostics_table import Touch
 from eitskin.robot.pose import IDENTITY, Pose, quaternion_xyzw
+from eitskin.surface.surface_map import SurfaceMap
 
 
 class FlatTouch(Protocol):
@@ -63,16 +65,28 @@ class PlacedTouch:
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Where a skin is: the ``pose`` of its drawing, with z out of the skin, in the frame of
-    ``link``."""
+    """Where a skin is in the frame of ``link``: the ``pose`` of its drawing, with z out of the
+    skin; of a ``surface`` the pose of its mesh."""
 
     link: str
     pose: Pose = IDENTITY
+    surface: SurfaceMap | None = None
 
     def place(self, touch: FlatTouch) -> PlacedTouch:
         """``touch`` in the link's frame."""
-        position_m = self.pose.points([touch.x_mm / 1e3, touch.y_mm / 1e3, 0.0])
-        return _placed(touch, position_m, self.pose.rotation, 1.0)
+        if self.surface is None:
+            position_m = self.pose.points([touch.x_mm / 1e3, touch.y_mm / 1e3, 0.0])
+            return _placed(touch, position_m, self.pose.rotation, 1.0)
+        if isinstance(touch, Touch):
+            there = self.surface.touch(touch)
+            point_m, normal, tangents = there.point_m, there.normal, there.tangents
+            scale = there.scale
+        else:  # after a drive, without a shape
+            places = self.surface.at([touch.x_mm, touch.y_mm])
+            point_m, normal, tangents = places.point_m[0], places.normal[0], places.tangents[0]
+            scale = float(places.scale[0])
+        rotation = self.pose.rotation @ np.column_stack([tangents, normal])
+        return _placed(touch, self.pose.points(point_m), rotation, scale)
 
 
 def _placed(

@@ -88,7 +88,7 @@ class RobotSkinSession:
             how,
             model=how.model if skin.model is None else skin.model,
             name=skin.name,
-            link=skin.link or skin.name,
+            link=skin.link,
             pose=skin.pose,
             record=None if how.record is None else skin_file(how.record, skin.name, part),
         )

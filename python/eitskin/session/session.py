@@ -30,7 +30,7 @@ from eitskin.device.transport import Capabilities
 from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.errors import UsageError
 from eitskin.robot.placement import Placement
-from eitskin.robot.pose import Pose
+from eitskin.robot.pose import IDENTITY, Pose
 from eitskin.session.assemble import Assembler, Clock
 from eitskin.session.frame import DriveReport, Frame, Message, Notice
 from eitskin.session.gestures import StreamGestures
@@ -172,9 +172,12 @@ class Session:
 
     @property
     def placement(self) -> Placement | None:
-        """Where the skin is on its robot's link; None where nobody says it."""
-        link = self.settings.link
-        return None if link is None else Placement(link, self.settings.pose)
+        """Where the skin is on its robot's link; None: it is flat, and no robot file says it."""
+        how, surface = self.settings, None if self.known is None else self.known.model.surface
+        if how.pose is None and surface is None:
+            return None
+        named = how.link or (None if surface is None else surface.link)
+        return Placement(named or self.given_name or "skin", how.pose or IDENTITY, surface)
 
     @property
     def parts(self) -> "dict[str, Session]":

@@ -12,7 +12,7 @@ from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import UsageError
-from eitskin.robot.pose import IDENTITY, Pose
+from eitskin.robot.pose import Pose
 from eitskin.tuning.for_model import operating_point_for, settings_text
 from eitskin.tuning.front import REPORT_US, Preset, board_takes
 
@@ -51,9 +51,10 @@ class SessionSettings:
         name: of the board, skin or source, in every message; None: the URL's, else the one
             in the board's settings, else the board's serial number.
         quiet_frames: the untouched frames of the reference are sent too, and their mean is kept.
-        link: the frame of reference on a robot that touches are placed in; None: the one that the
-            model of a surface names, and for a flat skin none.
-        pose: where the skin is in it.
+        pose: where the skin is on a link of a robot; None: no robot file says it, and only the
+            model of a surface does.
+        link: the link's frame of reference; None: the one that the model of a surface names, else
+            the name.
     """
 
     mode: Stream | None = Stream.TOUCHES
@@ -72,8 +73,8 @@ class SessionSettings:
     record: Path | None = None
     name: str | None = None
     quiet_frames: bool = False
+    pose: Pose | None = None
     link: str | None = None
-    pose: Pose = IDENTITY
 
     def scan_and_solver(
         self, board: BoardInfo, known: KnownModel | None, name: str, say: Say
