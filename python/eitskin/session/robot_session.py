@@ -19,7 +19,7 @@ from eitskin.device.client import TARE_FRAMES
 from eitskin.device.link import Reconnect
 from eitskin.device.pacing import Pacer, WallClock
 from eitskin.device.timing import check_speed
-from eitskin.errors import EitskinError, UsageError
+from eitskin.errors import DeviceError, EitskinError, UsageError
 from eitskin.robot.description import Robot, RobotSkin, is_robot, looped, open_robot
 from eitskin.robot.pose import Pose
 from eitskin.robot.recorded import begin_folder, skin_file, write_recorded
@@ -71,18 +71,18 @@ class RobotSkinSession:
 
     def __init__(self, robot: "RobotSession", skin: RobotSkin, index: int) -> None:
         self.skin, self._robot, self._index = skin, robot, index
-        self.session = self._new_session(1)
+        self._begun = 0  # sessions that have started
+        self._frames = 0
+        self.session = self._new_session()
         self.summary = Summary()
         self.waiting: deque[tuple[int, Message]] = deque()
         self.started = self.over = False
         self.room = threading.Condition(robot.lock)
         self.starts_us: int | None = None  # the first frame's time
         self._clock, self._last_s = HostClock(), 0.0
-        self._frames = 0
         self._thread = threading.Thread(target=self._run, name=f"eitskin {skin.name}", daemon=True)
 
-    def _new_session(self, part: int) -> Session:
-        """``part`` of the recording, from 1."""
+    def _new_session(self) -> Session:
         robot, skin, how = self._robot, self.skin, self._robot.settings
         settings = replace(
             how,
@@ -90,7 +90,10 @@ class RobotSkinSession:
             name=skin.name,
             link=skin.link,
             pose=skin.pose,
-            record=None if how.record is None else skin_file(how.record, skin.name, part),
+            frames=max(how.frames - self._frames, 1) if how.frames else 0,
+            record=None
+            if how.record is None
+            else skin_file(how.record, skin.name, self._begun + 1),
         )
 
         def named(say: Say) -> Say:
@@ -119,21 +122,28 @@ class RobotSkinSession:
     def _run(self) -> None:
         robot = self._robot
         try:
-            self.session.start()
+            self._start(self.session)
             robot.note(self, started=True)
-            if not robot.begun.wait():
-                return
+            robot.begun.wait()
             while not robot.stopping.is_set():
                 try:
                     self._read()
                     return
-                except EitskinError as error:
-                    if self.session.timed or not self._come_back(error):
+                except DeviceError as error:
+                    if self.session.timed:
                         raise
+                    self._come_back(error)
         except BaseException as error:
             robot.note(self, error=_named(self.skin.name, error))
         finally:
             robot.note(self, over=True)
+
+    def _start(self, session: Session) -> None:
+        self.session = session
+        if self._robot.stopping.is_set():  # between two sessions
+            session.stop()
+        session.start()
+        self._begun += 1
 
     def _read(self) -> None:
         messages = self.session.messages()
@@ -145,36 +155,30 @@ class RobotSkinSession:
         finally:
             messages.close()
 
-    def _come_back(self, error: EitskinError) -> bool:
-        """Open a board that failed again and again, less and less often; False once the robot's
-        session ends."""
-        robot, wait_s, said, tries = self._robot, FIRST_WAIT_S, "", 1
-        while not robot.stopping.is_set():
+    def _come_back(self, error: DeviceError) -> None:
+        """Open a board that failed again and again, less and less often, until it answers or the
+        robot's session ends."""
+        robot, wait_s, said = self._robot, FIRST_WAIT_S, ""
+        while True:
             if str(error) != said:
                 said = str(error)
                 self._notice(f"link: lost: {said}; opening it again until it answers")
             self.session.close(said)
             if robot.stopping.wait(wait_s):
-                break
+                return
             wait_s = min(2 * wait_s, MAX_WAIT_S)
-            tries += 1
-            session = self._new_session(tries)
-            if robot.settings.frames:
-                rest = max(robot.settings.frames - self._frames, 1)
-                session.settings = replace(session.settings, frames=rest)
+            session = self._new_session()
             try:
                 session.__enter__()
-                self.session = session
-                session.start()
-            except EitskinError as other:
+                self._start(session)
+            except DeviceError as other:
                 error = other
                 continue
             self._clock = HostClock()
             recorded = session.settings.record
             more = "" if recorded is None else f"; its recording goes on in {recorded.name}"
             self._notice(f"link: back: {session.name}{more}")
-            return True
-        return False
+            return
 
     def _notice(self, text: str) -> None:
         self._put(Notice("link", text, self._last_s, time.time(), source=self.skin.name))
@@ -398,7 +402,11 @@ class RobotSession:
             for skin in self._skins:
                 skin.begin()
             with self.lock:
-                while self._error is None and not all(one.started for one in self._skins):
+                while not (
+                    self._error is not None
+                    or self.stopping.is_set()
+                    or all(one.started for one in self._skins)
+                ):
                     self.arrived.wait(LOOK_S)
         if self._error is not None:
             self.stop()

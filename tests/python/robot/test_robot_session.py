@@ -19,7 +19,7 @@ from eitskin.errors import DeviceError, FileError, SkinTouchedError, UsageError
 from eitskin.robot.description import load_robot
 from eitskin.session.frame import DriveReport, Frame, Notice
 from eitskin.session.message import schema
-from eitskin.session.robot_session import HostClock, RobotSession, open_session
+from eitskin.session.robot_session import ROOM, HostClock, RobotSession, open_session
 from eitskin.session.settings import SessionSettings
 
 VALID = jsonschema.Draft202012Validator(schema())
@@ -200,7 +200,8 @@ def test_a_board_that_goes_comes_back_while_others_go_on(tmp_path):
     )
     came: list[tuple[str, str]] = []
     second: list[Wire] = []
-    with open_session(f"{path}?speed=1", SessionSettings(tare=4)) as session:
+    settings = SessionSettings(tare=4, record=tmp_path / "run")
+    with open_session(f"{path}?speed=1", settings) as session:
         end_s = time.monotonic() + 30
         for message in session.messages():
             kind = message.text if isinstance(message, Notice) else "frame"
@@ -221,3 +222,50 @@ def test_a_board_that_goes_comes_back_while_others_go_on(tmp_path):
     back = next(k for k, one in enumerate(came) if one[1].startswith("link: back"))
     assert any(what.startswith("link: unplugged") for what in real)
     assert ("sim", "frame") in came[lost:back]
+    assert came[back][1].endswith("; its recording goes on in real-2.eits")
+    for name in ("real", "real-2", "sim"):
+        assert main(["replay", str(tmp_path / "run" / f"{name}.eits")]) == 0
+    real_skin, sim = load_robot(tmp_path / "run" / "robot.toml").skins
+    assert real_skin.starts_s < 1 and sim.starts_s == 0
+
+
+def several(folder: Path, scene: str, count: int) -> Path:
+    path = folder / "several.toml"
+    skins = (f'[[skin]]\nname = "skin{k}"\ndevice = "sim:{scene}"\n' for k in range(count))
+    path.write_text("".join(skins))
+    return path
+
+
+def test_skins_wait_for_a_slow_reader(tmp_path):
+    """No more than ROOM messages of each wait, and none is lost."""
+    with open_session(f"{several(tmp_path, 'two_touch', 5)}?loop=1", SessionSettings()) as session:
+        assert isinstance(session, RobotSession)
+        numbers: dict[str | None, list[int]] = {}
+        messages = session.messages()
+        for _, message in zip(range(5 * 8), messages, strict=False):
+            time.sleep(0.002)
+            assert max(len(one.waiting) for one in session._skins) <= ROOM
+            if isinstance(message, Frame):
+                numbers.setdefault(message.source, []).append(message.number)
+        messages.close()
+    assert len(numbers) == 5
+    assert {tuple(np.diff(one)) for one in numbers.values()} == {(1,) * 7}
+
+
+@pytest.mark.long("test_skins_wait_for_a_slow_reader")
+def test_sixteen_skins_stay_within_their_memory(tmp_path):
+    """The resident memory after 30,000 frames is that after 10,000, within 3 MB."""
+
+    def resident_mb() -> float:
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return int(next(one for one in lines if one.startswith("VmRSS")).split()[1]) / 1e3
+
+    with open_session(f"{several(tmp_path, 'swipe', 16)}?loop=1", SessionSettings()) as session:
+        count, seen = 0, []
+        for message in session.messages():
+            count += isinstance(message, Frame)
+            if isinstance(message, Frame) and count % 10_000 == 0:
+                seen.append(resident_mb())
+            if count == 30_000:
+                session.stop()
+    assert seen[2] < seen[0] + 3, seen
