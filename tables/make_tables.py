@@ -1,5 +1,5 @@
 """Write what the tables in this folder say to every place that needs it: C headers, Python modules
-and reference pages.
+and reference pages. From the messages' JSON Schema, write types for TypeScript and C++.
 
 ``python tables/make_tables.py`` writes; with ``--check`` it only names the files that differ, and
 fails if any does. What it writes is committed, so that no build needs this program.
@@ -24,6 +24,7 @@ from write_c import c_headers, c_layouts, c_options, c_texts
 from write_constants import c_constants
 from write_docs import pages
 from write_python import python_modules
+from write_types import message_types
 
 
 def written(tables: Tables) -> Iterator[tuple[Path, str]]:
@@ -36,6 +37,7 @@ def written(tables: Tables) -> Iterator[tuple[Path, str]]:
         *c_constants(tables),
         *python_modules(tables),
         *pages(tables),
+        *message_types(),
     ):
         yield ROOT / path, "\n".join(lines).rstrip("\n") + "\n"
 
