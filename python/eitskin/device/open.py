@@ -122,6 +122,11 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
     url, _ = split_name(url)
     bare, timing = split_timing(url)
     scheme, colon, rest = bare.partition(":")
+    if scheme == "robot" or (not colon and scheme.endswith((".toml", ".urdf"))):
+        raise UsageError(
+            f"device {url!r}: a robot has several boards; it can be streamed, recorded and viewed;"
+            " for all else name one board of its file"
+        )
     brought = scheme not in SCHEMES and scheme in source_schemes()
     if (scheme not in SCHEMES and not brought) or (scheme == "auto") == bool(colon):
         if scheme.startswith("/") or scheme.upper().startswith("COM"):
@@ -146,11 +151,6 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
         raise UsageError(
             f"device {url!r}: something must follow the colon, as in serial:/dev/ttyACM0 or"
             " sim:two_touch"
-        )
-    if scheme == "robot":
-        raise UsageError(
-            f"device {url!r}: a robot has several boards; it can be streamed, recorded and viewed;"
-            " for all else name one board of its file"
         )
     if scheme == "text":
         from eitskin.device.text_source import open_text
