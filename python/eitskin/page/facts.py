@@ -104,6 +104,20 @@ def _one(name: str, session: Session, base: Pose | None) -> dict[str, Any]:
         "has_truth": session.observer is not None,
         "finger_mm": session.capabilities.finger_mm,
         "skin": _skin(session),
+        "surface": _surface(session),
+    }
+
+
+def _surface(session: Session) -> dict[str, Any] | None:
+    """The surface that a skin covers, in the frame that ``pose`` maps, and the place of each of its
+    vertices in the skin's drawing; None for a flat skin."""
+    surface = None if session.known is None else session.known.model.surface
+    if surface is None:
+        return None
+    return {
+        "flat_mm": _rounded(surface.flat_mm),
+        "points_m": np.round(surface.points_m(), 6).tolist(),
+        "triangles": surface.triangles.tolist(),
     }
 
 

@@ -25,8 +25,9 @@ def add_parser(subparsers: Any) -> None:
     wiring = what.add_parser("wiring", help="the wiring of board, multiplexers and skin")
     option(wiring, "-o --output PNG", None, Path, required=True)
     wiring.set_defaults(run=run_wiring)
-    live = what.add_parser("live", help="the live page before the emulated board, moving")
+    live = what.add_parser("live", help="the live page before a simulated skin, moving")
     option(live, "-o --output WEBP", None, Path, required=True)
+    option(live, "--robot", "instead the arm of examples/robot in three dimensions, one picture")
     live.set_defaults(run=run_live)
     examples = what.add_parser("examples", help="hand.svg and forearm.dxf")
     option(examples, "-o --output FOLDER", None, Path, required=True)
@@ -67,10 +68,10 @@ def run_wiring(options: argparse.Namespace) -> int:
 def run_live(options: argparse.Namespace) -> int:
     """Record the live page."""
     from eitskin.fileio import refuse_unwritable
-    from eitskin_studies.pictures.live_view_picture import draw_live_view
+    from eitskin_studies.pictures.live_view_picture import draw_live_robot, draw_live_view
 
     refuse_unwritable(options.output)
-    draw_live_view(options.output)
+    (draw_live_robot if options.robot else draw_live_view)(options.output)
     print(f"picture: {options.output}")
     return 0
 

@@ -13,8 +13,9 @@ from eitskin_studies.harness.extras import missing_studies_extra
 
 DRIVER = "/usr/bin/chromedriver"
 FLAGS = (
-    "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run"
-    " --disable-background-networking --disable-component-update --disable-sync"
+    "--headless=new --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader"
+    " --disable-quic --no-first-run --disable-background-networking"
+    " --disable-component-update --disable-sync"
 )
 
 

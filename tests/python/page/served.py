@@ -16,8 +16,9 @@ from eitskin.session.settings import SessionSettings
 
 TOKEN = "a word for tests"
 FLAGS = (
-    "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run"
-    " --disable-background-networking --disable-component-update --disable-sync"
+    "--headless=new --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader"
+    " --disable-quic --no-first-run --disable-background-networking"
+    " --disable-component-update --disable-sync"
 )
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
@@ -34,7 +35,9 @@ def until(what: Callable[[], Any], seconds: float = 30.0) -> Any:
 @contextmanager
 def serving(url: str, mode: Stream = ALL, **more: Any) -> Iterator[PageServer]:
     """The page of ``url`` on a free port."""
-    settings = SessionSettings(mode, quiet_frames=True, zones=more.pop("zones", ()))
+    settings = SessionSettings(
+        mode, quiet_frames=True, zones=more.pop("zones", ()), model=more.pop("model", None)
+    )
     more = {"token": TOKEN, "host": "127.0.0.1"} | more
     server = PageServer(url, settings, listen("127.0.0.1", 0), **more)
     thread = threading.Thread(target=server.serve, daemon=True)

@@ -15,7 +15,7 @@ export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-function channels(hex) {
+export function channels(hex) {
   const number = parseInt(hex.slice(1), 16);
   return [number >> 16, (number >> 8) & 255, number & 255];
 }
@@ -35,12 +35,52 @@ export function fitted(canvas) {
   return [context, width, height];
 }
 
+// The image of a skin as pixels; row 0 is the highest y.
+export class SkinImage {
+  constructor(skin) {
+    this.skin = skin;
+    this.peak = 0;
+    this.data = new ImageData(skin.nx, skin.ny);
+    this.words = new Uint32Array(this.data.data.buffer);
+    this.cells = Int32Array.from(skin.cells, (cell) => {
+      const row = Math.floor(cell / skin.nx);
+      return (skin.ny - 1 - row) * skin.nx + (cell - row * skin.nx);
+    });
+    this.takeColours();
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.takeColours());
+  }
+
+  takeColours() {
+    const [low, middle, high] = ["low", "middle", "high"].map((name) => channels(colour(`--${name}`)));
+    this.ramp = new Uint32Array(511); // from -255 to 255
+    for (let k = -255; k <= 255; ++k) {
+      const end = k < 0 ? low : high, part = Math.pow(Math.abs(k) / 255, 0.8);
+      const [r, g, b] = middle.map((from, i) => Math.round(from + (end[i] - from) * part));
+      this.ramp[k + 255] = (255 << 24) | (b << 16) | (g << 8) | r;
+    }
+    this.painted = undefined;
+  }
+
+  // null: no image
+  paint(image) {
+    if (image === this.painted) return;
+    this.painted = image;
+    this.words.fill(this.ramp[255]);
+    if (!image) return;
+    let peak = 0;
+    for (const value of image) peak = Math.max(peak, Math.abs(value));
+    // the colours' range follows the largest change at once, and shrinks slowly
+    this.peak = Math.max(peak, 0.98 * this.peak, 0.02 * this.skin.conductivity_s_per_m);
+    const factor = 255 / this.peak;
+    for (let k = 0; k < this.cells.length; ++k) this.words[this.cells[k]] = this.ramp[255 + Math.round(image[k] * factor)];
+  }
+}
+
 export class SkinDrawing {
   constructor(canvas) {
     this.canvas = canvas;
     this.pixels = document.createElement("canvas");
     this.trails = new Map(); // id -> [{x, y, t}]
-    this.peak = 0;
     this.skin = null;
     this.takeColours();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.takeColours());
@@ -50,28 +90,16 @@ export class SkinDrawing {
     this.colours = Object.fromEntries(
       ["ink", "soft", "line", "panel", "accent", "touch", "true", "good", "warn", "bad", "middle", "high", "low"].map(
         (name) => [name, colour(`--${name}`)]));
-    const [low, middle, high] = ["low", "middle", "high"].map((name) => channels(this.colours[name]));
-    this.ramp = new Uint32Array(511); // from -255 to 255
-    for (let k = -255; k <= 255; ++k) {
-      const end = k < 0 ? low : high, part = Math.pow(Math.abs(k) / 255, 0.8);
-      const [r, g, b] = middle.map((from, i) => Math.round(from + (end[i] - from) * part));
-      this.ramp[k + 255] = (255 << 24) | (b << 16) | (g << 8) | r;
-    }
   }
 
-  setSkin(skin) {
+  // ``image``: its SkinImage
+  setSkin(skin, image) {
     this.skin = skin;
+    this.image = image;
     this.trails.clear();
-    this.peak = 0;
     if (!skin) return;
     this.pixels.width = skin.nx;
     this.pixels.height = skin.ny;
-    this.data = this.pixels.getContext("2d").createImageData(skin.nx, skin.ny);
-    this.words = new Uint32Array(this.data.data.buffer);
-    this.cells = Int32Array.from(skin.cells, (cell) => {
-      const row = Math.floor(cell / skin.nx);
-      return (skin.ny - 1 - row) * skin.nx + (cell - row * skin.nx); // row 0 is the lowest y
-    });
     const xs = skin.outline_mm.map((p) => p[0]), ys = skin.outline_mm.map((p) => p[1]);
     this.box = [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
   }
@@ -161,15 +189,9 @@ export class SkinDrawing {
   }
 
   drawImage(context, outline, image) {
-    const { skin, words, cells, ramp } = this;
-    let peak = 0;
-    for (const value of image) peak = Math.max(peak, Math.abs(value));
-    // the colours' range follows the largest change at once, and shrinks slowly
-    this.peak = Math.max(peak, 0.98 * this.peak, 0.02 * skin.conductivity_s_per_m);
-    words.fill(ramp[255]);
-    const factor = 255 / this.peak;
-    for (let k = 0; k < cells.length; ++k) words[cells[k]] = ramp[255 + Math.round(image[k] * factor)];
-    this.pixels.getContext("2d").putImageData(this.data, 0, 0);
+    const { skin } = this;
+    this.image.paint(image);
+    this.pixels.getContext("2d").putImageData(this.image.data, 0, 0);
     const [x0, y0] = skin.origin_mm, wide = skin.nx * skin.pixel_mm, high = skin.ny * skin.pixel_mm;
     context.save();
     context.clip(outline);
@@ -347,7 +369,7 @@ export class VoltsDrawing {
     }
     context.textAlign = "left";
     context.textBaseline = "alphabetic";
-    const times = known && apart > 0 ? `; difference at most ${(1e3 * apart).toPrecision(3)} mV, drawn ${enlarged.toPrecision(2)} times` : "";
+    const times = known && apart > 0 ? `; difference up to ${(1e3 * apart).toPrecision(3)} mV, × ${enlarged.toPrecision(2)}` : "";
     context.fillText(`${volts.length} rows${times}`, left, height - 4);
     const line = (value, name, wide) => {
       context.strokeStyle = colour(name);

@@ -1,6 +1,7 @@
 // The live page: takes what the server sends, draws the newest frame, and says what the user wants.
-import { SkinDrawing, VoltsDrawing, idColour } from "./drawing.js";
+import { SkinDrawing, SkinImage, VoltsDrawing, idColour } from "./drawing.js";
 import { PlotsDrawing } from "./plots.js";
+import { SurfaceDrawing } from "./surface.js";
 
 const $ = (id) => document.getElementById(id);
 const MAGIC = 0x31465645; // "EVF1"
@@ -12,12 +13,13 @@ const MAX_FINGERS = 5; // that may press at once
 const GESTURE_MS = 4000; // that a gesture stays to be read
 
 const skin = new SkinDrawing($("skin"));
+const space = new SurfaceDrawing($("surface"), $("labels"));
 const plots = new PlotsDrawing($("plots"));
 const volts = new VoltsDrawing($("volts"));
 const page = {
-  socket: null, setup: null, frame: null, asked: false, times: [], health: {}, dropped: 0, skipped: 0,
+  socket: null, setup: null, frames: new Map(), shown: null, images: new Map(), asked: false, times: [], health: {}, dropped: 0, skipped: 0,
   wordsAt: 0, words: "", gestures: [], pressed: new Set(), state: "", teach: null,
-  fingers: new Map(), pressing: false, pressAgain: false, seeking: false,
+  fingers: new Map(), turning: new Map(), pressing: false, pressAgain: false, seeking: false,
 };
 const token = new URLSearchParams(location.hash.slice(1)).get("token");
 
@@ -53,14 +55,16 @@ function takeFrame(buffer) {
   if (head.getUint32(0, true) !== MAGIC) return;
   const [number, pixels, rows] = [4, 8, 12].map((at) => head.getUint32(at, true));
   const text = new TextDecoder().decode(new Uint8Array(buffer, 16 + 4 * (pixels + rows)));
-  page.frame = {
+  const message = JSON.parse(text), source = sourceOf(message);
+  const frame = {
     number,
     image: pixels ? new Float32Array(buffer, 16, pixels) : null,
     volts: rows ? new Float32Array(buffer, 16 + 4 * pixels, rows) : null,
-    message: JSON.parse(text),
+    message,
   };
-  const { message } = page.frame;
-  follow(message);
+  page.frames.set(source, frame);
+  page.newest = number;
+  follow(message, source);
   for (const event of message.events || []) {
     if (event.zone && event.kind === "press") page.pressed.add(event.zone);
     if (event.zone && event.kind === "release") page.pressed.delete(event.zone);
@@ -70,13 +74,24 @@ function takeFrame(buffer) {
   soon();
 }
 
-function follow(message) {
+// The name of a message's skin. Before the first setup there is none.
+function sourceOf(message) {
+  const skins = page.setup ? page.setup.skins : [];
+  return skins.some((one) => one.source === message.source) ? message.source : page.shown;
+}
+
+function shownFrame() {
+  return page.frames.get(page.shown);
+}
+
+function follow(message, source) {
+  plots.follow(message.touches || [], message.time_s);
+  if (source !== page.shown) return;
   const { times } = page, last = times[times.length - 1];
   if (last && message.time_s < last.time_s) times.length = 0;
   times.push({ at: performance.now(), frame: message.frame, time_s: message.time_s });
   while (times.length > 2 && times[0].at < performance.now() - 2000) times.shift();
   skin.follow(message.touches || [], message.time_s);
-  plots.follow(message.touches || [], message.time_s);
 }
 
 // touches after a drive, newer than the newest frame
@@ -91,7 +106,7 @@ function soon() {
   requestAnimationFrame(() => {
     page.asked = false;
     draw();
-    if (page.frame) send({ type: "drawn", number: page.frame.number });
+    if (page.newest) send({ type: "drawn", number: page.newest });
   });
 }
 
@@ -126,8 +141,8 @@ function takeSetup(setup) {
   page.report = null;
   $("device").textContent = `${setup.name && setup.name + " · "}${setup.url} · ${setup.board}, ${setup.electrodes} electrodes`;
   document.title = `${setup.url} · eitskin`;
-  const same = before && before.model_crc === setup.model_crc && before.url === setup.url && Boolean(before.skin) === Boolean(setup.skin);
-  if (!same) skin.setSkin(setup.skin);
+  const what = ({ model_crc, url, skins }) => JSON.stringify([model_crc, url, skins.map((one) => [one.source, one.pose, Boolean(one.skin)])]);
+  if (!before || what(before) !== what(setup)) takeSkins(setup.skins);
   const may = setup.may_command, board = may && !setup.replays;
   $("undo").hidden = !setup.can_undo_tare;
   for (const id of ["tare", "undo", "record", "preset", "sign", "iterations", "model"]) $(id).disabled = !board;
@@ -136,10 +151,7 @@ function takeSetup(setup) {
     box.checked = setup.mode.includes(box.value);
   }
   for (const id of ["play", "step", "speed", "at"]) $(id).disabled = !may;
-  const pressable = may && Boolean(setup.skins[0].finger_mm) && Boolean(setup.skin);
-  $("hint").hidden = !pressable;
-  $("skin").classList.toggle("pressable", pressable);
-  if (!pressable) page.fingers.clear();
+  showView();
   $("timeline").hidden = !setup.length_s;
   if (setup.length_s) $("at").max = setup.length_s;
   if (setup.replays) $("download").hidden = !may;
@@ -158,6 +170,45 @@ function takeSetup(setup) {
   showPlay();
   showTeachButtons();
   soon();
+}
+
+function takeSkins(skins) {
+  const known = skins.filter((one) => one.skin);
+  page.images = new Map(known.map((one) => [one.source, new SkinImage(one.skin)]));
+  page.frames.clear();
+  space.setSkins(skins, page.images);
+  $("which").replaceChildren(...skins.map((one) => new Option(one.source)));
+  $("which-label").hidden = skins.length < 2;
+  showSkin(skins.some((one) => one.source === page.shown) ? page.shown : skins[0].source);
+}
+
+// The skin whose numbers, voltages and flat drawing are shown.
+function showSkin(source) {
+  page.shown = source;
+  page.times.length = 0;
+  $("which").value = source;
+  skin.setSkin(shownSkin().skin, page.images.get(source));
+  soon();
+}
+
+function shownSkin() {
+  return page.setup.skins.find((one) => one.source === page.shown);
+}
+
+// In three dimensions are drawn several skins, and one that covers a surface.
+function showView() {
+  const { skins, may_command } = page.setup;
+  const deep = space.gl && space.shapes.length > 0 && (skins.length > 1 || Boolean(skins[0].surface));
+  page.deep = deep && !$("flat").checked;
+  page.may_press = may_command && skins.some((one) => one.finger_mm && one.skin);
+  $("flat-label").hidden = !deep;
+  $("skin").hidden = page.deep;
+  $("space").hidden = !page.deep;
+  $("skin").classList.toggle("pressable", page.may_press);
+  const press = "Press the skin with mouse or finger, or with Enter and the arrow keys.";
+  const turn = `Drag ${page.may_press ? "on a skin to press it, beside it to turn the view" : "to turn the view"}; wheel or two fingers zoom.`;
+  $("hint").textContent = page.deep ? turn : page.may_press ? press : "";
+  if (!page.may_press) page.fingers.clear();
 }
 
 function showPlay() {
@@ -209,12 +260,14 @@ function cell(text) {
 }
 
 function showTouches(touches) {
+  const several = page.setup.skins.length > 1;
+  $("of-skin").hidden = !several;
   const rows = touches.map((touch) => {
     const row = document.createElement("tr");
     row.dataset.id = touch.id;
     row.style.setProperty("--id", idColour(touch.id));
     const sure = touch.confidence === null ? "–" : `${Math.round(100 * touch.confidence)} %`;
-    row.append(cell(touch.id), cell(touch.x_mm.toFixed(1)), cell(touch.y_mm.toFixed(1)), cell(touch.radius_mm.toFixed(1)),
+    row.append(cell(touch.id), ...(several ? [cell(touch.source)] : []), cell(touch.x_mm.toFixed(1)), cell(touch.y_mm.toFixed(1)), cell(touch.radius_mm.toFixed(1)),
       cell(touch.force_n ? touch.force_n.toFixed(2) : "–"), cell(sure));
     return row;
   });
@@ -268,14 +321,17 @@ function rates() {
 }
 
 function draw() {
-  const { frame, setup } = page;
-  skin.draw(frame, { report: page.report, health: page.health, trails: $("trails").checked, truth: $("truth").checked,
+  const { setup } = page, frame = shownFrame();
+  if (page.deep) space.draw(page.frames, { truth: $("truth").checked, fingers: fingersBySkin(), finger_mm: fingerRadius(),
+    health: new Map([...page.frames].map(([source, one]) => [source, healthOf(one.message.info)])) });
+  else skin.draw(frame, { report: page.report, health: page.health, trails: $("trails").checked, truth: $("truth").checked,
     zones: setup ? setup.zones : [], pressed: page.pressed, teach: page.teach,
-    fingers: page.fingers.values(), finger_mm: setup ? setup.skins[0].finger_mm : 0 });
+    fingers: setup ? fingersBySkin().get(page.shown) || [] : [], finger_mm: fingerRadius() });
   if (!frame || !setup) return;
-  const { message } = frame, { info } = message, touches = message.touches || [];
+  const { message } = frame, { info } = message;
+  const touches = [...page.frames].flatMap(([source, one]) => (one.message.touches || []).map((touch) => ({ ...touch, source })));
   $("plots").ariaLabel = plots.draw(skin.box);
-  $("volts").ariaLabel = volts.draw(frame.volts, setup.reference_v);
+  $("volts").ariaLabel = volts.draw(frame.volts, page.shown === setup.skins[0].source ? setup.reference_v : null);
   showElectrodes(healthOf(info), setup.electrodes);
   showTouches(touches);
   chips($("found"), message.refused ? [`refused: ${message.refused}`, ...message.found] : message.found, "nothing found wrong");
@@ -287,8 +343,9 @@ function draw() {
   showTime(message.time_s, setup.length_s);
   const solve_us = info ? info.solve_us + info.touch_us : 0;
   $("n-solve").textContent = solve_us ? `${(solve_us / 1e3).toFixed(1)} ms` : "–";
-  $("scale-low").textContent = `−${skin.peak.toPrecision(2)}`;
-  $("scale-high").textContent = `+${skin.peak.toPrecision(2)}`;
+  const { peak } = page.images.get(page.shown) || { peak: 0 };
+  $("scale-low").textContent = `−${peak.toPrecision(2)}`;
+  $("scale-high").textContent = `+${peak.toPrecision(2)}`;
   sayTouches(touches);
 }
 
@@ -306,6 +363,7 @@ function sayTouches(touches) {
       touches.map((t) => `number ${t.id} at ${t.x_mm.toFixed(0)}, ${t.y_mm.toFixed(0)} millimetres`).join("; ")
     : "No touch";
   $("skin").ariaLabel = `The skin from above. ${words}`;
+  $("surface").ariaLabel = `The skins in three dimensions. ${words}`;
   const now = performance.now();
   if (words === page.words || now - page.wordsAt < WORDS_MS) return;
   page.words = words;
@@ -321,7 +379,18 @@ function press() {
   page.pressAgain = page.pressing;
   if (page.pressing) return;
   page.pressing = true;
-  send({ type: "do", do: "press", value: { [page.setup.skins[0].source]: [...page.fingers.values()].slice(0, MAX_FINGERS) } });
+  send({ type: "do", do: "press", value: Object.fromEntries(fingersBySkin()) });
+}
+
+// Where this page's fingers press, by the names of the skins.
+function fingersBySkin() {
+  const places = new Map();
+  for (const { source, place } of page.fingers.values()) places.set(source, [...(places.get(source) || []), place].slice(0, MAX_FINGERS));
+  return places;
+}
+
+function fingerRadius() {
+  return page.setup ? shownSkin().finger_mm || 8 : 0;
 }
 
 function pressAnswered(ok, text) {
@@ -330,35 +399,74 @@ function pressAnswered(ok, text) {
   if (page.pressAgain) press();
 }
 
-function moveFinger(id, place) {
-  if (!place || !$("skin").classList.contains("pressable")) return;
-  page.fingers.set(id, place);
+// ``at``: a skin's name and a place of its drawing
+function moveFinger(id, at) {
+  if (!at || !page.may_press || !page.setup.skins.find((one) => one.source === at.source).finger_mm) return false;
+  page.fingers.set(id, at);
   press();
+  return true;
 }
 
 function liftFinger(id) {
   if (page.fingers.delete(id)) press();
 }
 
-const placeOf = (event) => skin.placeAt(event.offsetX, event.offsetY);
-$("skin").addEventListener("pointerdown", (event) => {
-  if (event.button) return;
-  moveFinger(event.pointerId, placeOf(event));
+function flatAt(x, y) {
+  const place = skin.placeAt(x, y);
+  return place && { source: page.shown, place };
+}
+
+for (const [name, at] of [["skin", flatAt], ["surface", (x, y) => space.pick(x, y)]]) {
+  $(name).addEventListener("pointerdown", (event) => {
+    if (event.button === 0 && !event.shiftKey && moveFinger(event.pointerId, at(event.offsetX, event.offsetY))) return;
+    if (name !== "surface") return;
+    page.turning.set(event.pointerId, [event.offsetX, event.offsetY]);
+    $(name).setPointerCapture(event.pointerId);
+  });
+  $(name).addEventListener("pointermove", (event) => {
+    if (page.fingers.has(event.pointerId)) moveFinger(event.pointerId, at(event.offsetX, event.offsetY)) || liftFinger(event.pointerId);
+    else if (page.turning.has(event.pointerId)) turnView(event);
+  });
+  for (const end of ["pointerup", "pointercancel", "pointerleave"]) $(name).addEventListener(end, (event) => {
+    liftFinger(event.pointerId);
+    page.turning.delete(event.pointerId);
+  });
+}
+
+// One pointer turns or shifts the view, two change its size.
+function turnView(event) {
+  const { turning } = page, before = turning.get(event.pointerId), now = [event.offsetX, event.offsetY];
+  const [right, down] = [now[0] - before[0], now[1] - before[1]];
+  const apart = () => Math.hypot(...[0, 1].map((k) => [...turning.values()][0][k] - [...turning.values()][1][k]));
+  const from = turning.size > 1 ? apart() : 0;
+  turning.set(event.pointerId, now);
+  if (turning.size > 1) space.zoom(from / Math.max(1, apart()));
+  else if (event.shiftKey || event.buttons === 2) space.shift(right, down);
+  else space.rotate(right / 150, down / 150);
+  soon();
+}
+
+$("surface").addEventListener("wheel", (event) => {
+  event.preventDefault();
+  space.zoom(Math.exp(event.deltaY / 600));
+  soon();
+}, { passive: false });
+$("surface").addEventListener("contextmenu", (event) => event.preventDefault());
+$("surface").addEventListener("keydown", (event) => {
+  if (!space.key(event.key)) return;
+  event.preventDefault();
+  soon();
 });
-$("skin").addEventListener("pointermove", (event) => {
-  if (page.fingers.has(event.pointerId)) moveFinger(event.pointerId, placeOf(event));
-});
-for (const end of ["pointerup", "pointercancel", "pointerleave"]) $("skin").addEventListener(end, (event) => liftFinger(event.pointerId));
 addEventListener("blur", () => {
   page.fingers.clear();
   press();
 });
 $("skin").addEventListener("keydown", (event) => {
   const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-  const place = page.fingers.get("keys"), size = $("skin");
+  const { place } = page.fingers.get("keys") || {}, size = $("skin");
   if (event.key === "Escape" || (event.key === "Enter" && place)) liftFinger("keys");
-  else if (event.key === "Enter") moveFinger("keys", skin.placeAt(size.clientWidth / 2, size.clientHeight / 2));
-  else if (step && place) moveFinger("keys", place.map((at, k) => at + STEP_MM * step[k]));
+  else if (event.key === "Enter") moveFinger("keys", flatAt(size.clientWidth / 2, size.clientHeight / 2));
+  else if (step && place) moveFinger("keys", { source: page.shown, place: place.map((at, k) => at + STEP_MM * step[k]) });
   else return;
   event.preventDefault();
 });
@@ -417,6 +525,11 @@ $("download").addEventListener("click", async () => {
     answer({ ok: false, text: `the recording did not come: ${error.message}` });
   }
 });
+$("flat").addEventListener("change", () => {
+  showView();
+  soon();
+});
+$("which").addEventListener("change", () => showSkin($("which").value));
 for (const id of ["truth", "trails"]) $(id).addEventListener("change", soon);
 addEventListener("resize", soon);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", soon);

@@ -12,11 +12,11 @@ export class PlotsDrawing {
 
   follow(touches, time) {
     const { times, lines } = this;
-    if (times.length && time < times[times.length - 1]) {
+    if (times.length && time < times[times.length - 1] - 1) { // not a frame of another skin
       times.length = 0;
       lines.clear();
     }
-    times.push(time);
+    times.push(Math.max(time, times[times.length - 1] || time));
     while (times[0] < time - SHOWN_S) times.shift();
     for (const touch of touches) {
       if (!lines.has(touch.id)) lines.set(touch.id, []);
