@@ -132,8 +132,7 @@ def show(options: argparse.Namespace, session: AnySession, outputs: Outputs | No
         say("stopped")
     except EitskinError as error:
         broken = error
-        for part in session.parts.values():
-            part.summary.link = part.device.counters.as_dict()
+        session.count_links()
     finally:
         messages.close()  # stops the board before it is asked for its counters
     if broken is None:

@@ -48,7 +48,7 @@ class HostClock:
         self._offset_us: float | None = None
         self._last_us = 0.0
 
-    def shared_us(self, made_us: int, arrived_us: float) -> float:
+    def offset_us(self, made_us: int, arrived_us: float) -> float:
         """How much is to be added to the board's times, by a message that was complete at
         ``made_us`` of its clock and came at ``arrived_us`` of the host's."""
         now = arrived_us - made_us
@@ -203,7 +203,7 @@ class RobotSkinSession:
             return replace(message, time_s=self._last_s)
         time_us = self._time_us(message)
         self._last_s = time_us / 1e6
-        number, count = self._index, len(self._robot.skins)
+        number, count = self._index, len(self._robot.robot.skins)
 
         def unique(one: int) -> int:
             return one and (one - 1) * count + number + 1
@@ -237,7 +237,7 @@ class RobotSkinSession:
             return message.time_us + round(1e6 * self.skin.starts_s)
         arrived_us = (time.monotonic_ns() - self._robot.began_ns) / 1e3
         scan_us = self.session.device.board.frame_us if isinstance(message, Frame) else 0
-        offset_us = self._clock.shared_us(message.time_us + scan_us, arrived_us)
+        offset_us = self._clock.offset_us(message.time_us + scan_us, arrived_us)
         return max(round(message.time_us + offset_us), 0)
 
 
@@ -313,7 +313,6 @@ class RobotSession:
         self.began_ns = 0  # of the clock that all skins share
         self._starting, self._threads = threading.RLock(), False
         self._error: BaseException | None = None
-        self.skins = robot.skins
         self._skins = [RobotSkinSession(self, one, k) for k, one in enumerate(robot.skins)]
 
     def __enter__(self) -> "RobotSession":
@@ -386,6 +385,11 @@ class RobotSession:
             counted = one.session.finish()
             one.summary.link, one.summary.board = counted.link, counted.board
         return self.summary
+
+    def count_links(self) -> None:
+        """As of ``Session``."""
+        for one in self._skins:
+            one.summary.link = one.session.device.counters.as_dict()
 
     def start(self) -> None:
         """Set up every skin, side by side; once.

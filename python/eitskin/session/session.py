@@ -461,6 +461,10 @@ class Session:
         self.summary.finish(self.device, self._answers_s)
         return self.summary
 
+    def count_links(self) -> None:
+        """Put what the link counted into the summary, without asking the board."""
+        self.summary.link = self.device.counters.as_dict()
+
     # ---- steps ----
 
     def _open(self) -> Device:

@@ -183,7 +183,7 @@ def test_a_boards_clock_is_followed():
     for k in range(30_000):
         host_us = 20_000.0 * k
         made_us = round(host_us * (1 - 50e-6)) + 7_000_000
-        offset = clock.shared_us(made_us, host_us + random.uniform(1000, 9000))
+        offset = clock.offset_us(made_us, host_us + random.uniform(1000, 9000))
         off.append(made_us + offset - host_us)
     assert (
         max(map(abs, off[500:])) < 3000 and max(abs(b - a) for a, b in pairwise(off[500:])) < 1000
