@@ -24,7 +24,7 @@ LONGEST = (
     "cli/test_cli_model.py", "fem/test_mesh.py", "frames/test_doctor.py",
     "emulator/test_emulated_board.py", "hardware/test_spice.py", "hardware/test_stages.py",
 )  # fmt: skip
-NEEDED = ("matplotlib", "netgen", "scipy", "skfem", "sklearn", "unicorn")
+NEEDED = ("matplotlib", "netgen", "scipy", "skfem", "sklearn", "trimesh", "unicorn")
 
 
 def pytest_sessionstart() -> None:

@@ -160,6 +160,11 @@ def run_build(options: argparse.Namespace) -> int:
     model = build_model(skin, protocol, settings, progress=bar("random skins"), jacobian=jacobian)
     size = save_model(options.output, model)
     _print_info(model, size, str(options.output), options.json)
+    if skin.surface is not None and skin.surface.simplified_from:
+        say(
+            f"{options.skin}: the surface of {skin.surface.simplified_from} triangles was"
+            f" simplified to {len(skin.surface.triangles)}"
+        )
     width_mm = 2 * skin.outline.area_mm2 / skin.outline.perimeter_mm
     if width_mm < MIN_PIXELS_ACROSS * model.grid.pixel_mm:
         say(

@@ -23,6 +23,7 @@ from eitskin.process import take_over
 COMMANDS = {  # the description of each command
     "demo": "reconstruct three simulated touches in C, and compare them with the truth",
     "model": "build, describe, verify or upload an .eitm model",
+    "surface": "make example surfaces, and check a skin on a surface",
     "reconstruct": "reconstruct touches and images from the frames in a file",
     "import": "convert a text, NPY, NPZ or MAT file of measured voltages to a frames file",
     "export": "write a model, frames and their images to a .mat file for EIDORS",

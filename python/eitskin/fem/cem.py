@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from eitskin.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IntArray
 from eitskin.errors import ProtocolError, UsageError, missing_extra
-from eitskin.fem.mesh import Mesh
+from eitskin.fem.mesh import Mesh, flat_gradients
 from eitskin.fem.patterns import Patterns, patterns_for
 from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
@@ -224,7 +224,7 @@ class ForwardModel:
         xx, yy, xy = (conductivity[:, k, None] for k in range(3))
         along_x, along_y = xx * x + xy * y, xy * x + yy * y
         products = x[:, :, None] * along_x[:, None, :] + y[:, :, None] * along_y[:, None, :]
-        volumes_m3 = self.mesh.areas_mm2[elements] * (1e-6 * self.thickness_m)
+        volumes_m3 = self.mesh.true_areas_mm2[elements] * (1e-6 * self.thickness_m)
         return np.asarray(products * volumes_m3[:, None, None])
 
     def _make_system(self, shunted: BoolArray) -> System:
@@ -243,11 +243,12 @@ def factorise(matrix: csc_matrix) -> Any:
 
 
 def shape_gradients(mesh: Mesh) -> FloatArray:
-    """Return the gradients of the three hat functions of each triangle, (E, 3, 2) in 1/m."""
-    corners = mesh.nodes_mm[mesh.triangles]
-    opposite = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)
-    turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
-    return np.asarray(turned * (1e3 / (2 * mesh.areas_mm2))[:, None, None])
+    """Return the gradients of the three hat functions of each triangle in its true shape, (E, 3, 2)
+    in 1/m."""
+    gradients = flat_gradients(mesh)
+    if mesh.stretch is None:
+        return gradients
+    return np.asarray(gradients @ np.linalg.inv(mesh.stretch))
 
 
 def mean_and_deviation(tensor: FloatArray) -> tuple[FloatArray, ComplexArray]:

@@ -5,7 +5,7 @@ displacement is harmonic, so it is smooth and decays with the distance from the 
 outline.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,8 +13,8 @@ import numpy as np
 
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import missing_extra
-from eitskin.fem.cem import factorise, shape_gradients
-from eitskin.fem.mesh import Mesh
+from eitskin.fem.cem import factorise
+from eitskin.fem.mesh import Mesh, flat_gradients
 
 try:
     from scipy.sparse import csc_matrix
@@ -72,7 +72,7 @@ class MeshDeformation:
         """The inner nodes, the factors of Laplace's matrix on them, and the part of that matrix
         that couples them to the rim's nodes."""
         mesh = self.mesh
-        gradients = shape_gradients(mesh) * np.sqrt(mesh.areas_mm2)[:, None, None]
+        gradients = flat_gradients(mesh) * np.sqrt(mesh.areas_mm2)[:, None, None]
         values = np.einsum("eik,ejk->eij", gradients, gradients)
         rows, columns = np.repeat(mesh.triangles, 3, axis=1), np.tile(mesh.triangles, (1, 3))
         whole = csc_matrix(
@@ -101,6 +101,7 @@ class MeshDeformation:
         """Return the mesh with each electrode moved along the rim by ``shift_mm`` (L,), its width
         multiplied by ``widths`` (L,), and the rim's nodes moved outwards by ``outwards_mm`` (B,).
 
+        Elements keep their stretch: places of a surface move as those of its flattened copy.
         If electrodes would meet or an element would turn over, all displacements are reduced.
         """
         rim, mesh = self.rim, self.mesh
@@ -113,7 +114,7 @@ class MeshDeformation:
         movement[rim.nodes] = step
         movement[inside] = factors.solve(-(to_rim @ step))
         for _ in range(HALVINGS):
-            candidate = Mesh(mesh.nodes_mm + movement, mesh.triangles, mesh.electrode_edges)
+            candidate = replace(mesh, nodes_mm=mesh.nodes_mm + movement, surface=None)
             if (candidate.areas_mm2 >= LEAST_AREA * mesh.areas_mm2).all():
                 return candidate
             movement *= 0.5

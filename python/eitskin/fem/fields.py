@@ -18,12 +18,14 @@ def electrode_fields(
     forward: ForwardModel, conductivity_s_per_m: npt.ArrayLike, grid: Grid
 ) -> FloatArray:
     """Return the mean gradient of the potential over each pixel for a current into each electrode,
-    (n, 2, L) in V/m per A.
+    (n, 2, L) in V/m per A, on the flattened copy if the skin covers a surface.
 
     Only differences between electrodes have a meaning: the field of a pair is that of its first
     electrode minus that of its second.
     """
     fields = element_fields(forward, forward.solve(conductivity_s_per_m))
+    if forward.mesh.stretch is not None:
+        fields = forward.mesh.stretch @ fields
     by_pixel = element_to_pixel(forward.mesh, grid).tocsc()
     by_pixel.data *= forward.mesh.areas_mm2[by_pixel.indices]
     area = np.maximum(np.asarray(by_pixel.sum(axis=0)).ravel(), np.finfo(float).tiny)

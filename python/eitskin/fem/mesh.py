@@ -19,6 +19,7 @@ import eitskin
 from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.errors import GeometryError, UsageError, missing_extra
 from eitskin.skin.skin import Skin
+from eitskin.surface.surface_map import SurfaceMap
 
 MIN_ELEMENTS = 200
 MAX_ELEMENTS = 200_000
@@ -31,11 +32,17 @@ class Mesh:
 
     ``electrode_edges`` holds for each electrode the rim edges under it as (k, 2) nodes, in
     counterclockwise order; both ends of an electrode are nodes. Arrays are read-only.
+
+    On a skin that covers a ``surface``, nodes are places of its flattened copy, and ``stretch``
+    (E, 2, 2) takes each triangle to its true shape: the symmetric matrix whose square gives the
+    lengths of the three-dimensional triangle. None is a flat skin.
     """
 
     nodes_mm: FloatArray
     triangles: IntArray
     electrode_edges: tuple[IntArray, ...]
+    surface: SurfaceMap | None = None
+    stretch: FloatArray | None = None
 
     @property
     def n_nodes(self) -> int:
@@ -55,6 +62,13 @@ class Mesh:
             for k in (1, 2)
         )
         return np.asarray((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2)
+
+    @cached_property
+    def true_areas_mm2(self) -> FloatArray:
+        """The area of each triangle on the surface, (E,); that on the plane for a flat skin."""
+        if self.stretch is None:
+            return self.areas_mm2
+        return np.asarray(self.areas_mm2 * np.linalg.det(self.stretch))
 
     def centroids_mm(self) -> FloatArray:
         """Return the centre of area of each triangle, (E, 2)."""
@@ -210,6 +224,8 @@ def _checked_mesh(skin: Skin, arrays: list[AnyArray], owner: IntArray) -> Mesh:
     for array in (nodes, triangles, *electrode_edges):
         array.flags.writeable = False
     mesh = Mesh(nodes, triangles, electrode_edges)
+    if skin.surface is not None:
+        mesh = lifted(mesh, skin.surface)
     area = float(mesh.areas_mm2.sum())
     if not (
         len(triangles) and mesh.areas_mm2.min() > 0 and abs(area / skin.outline.area_mm2 - 1) < 0.05
@@ -223,6 +239,29 @@ def _checked_mesh(skin: Skin, arrays: list[AnyArray], owner: IntArray) -> Mesh:
             f"skin {skin.name!r}: the mesh has loose nodes or bare electrodes; use a smaller size"
         )
     return mesh
+
+
+def lifted(mesh: Mesh, surface: SurfaceMap) -> Mesh:
+    """Return ``mesh`` of a flattened copy with the lengths that its triangles have if their corners
+    are put on ``surface``."""
+    points = 1e3 * surface.at(mesh.nodes_mm).point_m
+    jacobian = 1e-3 * np.einsum("eka,ekd->ead", points[mesh.triangles], flat_gradients(mesh))
+    square = np.einsum("eab,ead->ebd", jacobian, jacobian)
+    # the root of a symmetric 2 x 2 matrix, by the theorem of Cayley and Hamilton
+    root = np.sqrt(np.maximum(np.linalg.det(square), 0.0))[:, None, None]
+    trace = np.trace(square, axis1=1, axis2=2)[:, None, None]
+    stretch = (square + root * np.eye(2)) / np.sqrt(trace + 2 * root)
+    stretch.flags.writeable = False
+    return Mesh(mesh.nodes_mm, mesh.triangles, mesh.electrode_edges, surface, stretch)
+
+
+def flat_gradients(mesh: Mesh) -> FloatArray:
+    """Return the gradients of the three hat functions of each triangle on the plane, (E, 3, 2) in
+    1/m."""
+    corners = mesh.nodes_mm[mesh.triangles]
+    opposite = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)
+    turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
+    return np.asarray(turned * (1e3 / (2 * mesh.areas_mm2))[:, None, None])
 
 
 def _chained(edges: IntArray) -> IntArray:

@@ -85,7 +85,7 @@ def _sensitivity(
         np.arange(forward.protocol.n_rows) if rows is None else np.asarray(rows, dtype=np.int64)
     )
     by_pixel, n_pixels = weights.tocsc(), weights.shape[1]
-    by_pixel.data *= forward.mesh.areas_mm2[by_pixel.indices] * 1e-6
+    by_pixel.data *= forward.mesh.true_areas_mm2[by_pixel.indices] * 1e-6
     fields = element_fields(forward, solution)
     jacobian = np.empty((len(chosen), n_pixels))
     for begin in range(0, n_pixels, PIXELS_AT_ONCE):
@@ -99,7 +99,8 @@ def _sensitivity(
 
 
 def element_fields(forward: ForwardModel, solution: Solution) -> FloatArray:
-    """Return the gradient of each pattern's potential on each element, (E, 2, P) in V/m per A."""
+    """Return the gradient of each pattern's potential on each element in its true shape, (E, 2, P)
+    in V/m per A."""
     triangles, gradients = forward.mesh.triangles, forward.gradients_per_m
     fields = gradients[:, 0, :, None] * solution.nodes[triangles[:, 0], None, :]
     for corner in (1, 2):

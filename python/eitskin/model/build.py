@@ -156,6 +156,7 @@ def make_model(
             stored_fields(skin, protocol, linear) if settings.data_kind == "difference" else None
         ),
         row_form=row_form(projection, stored),
+        surface=skin.surface,
     )
     return replace(model, golden=replace(model.golden, image=_golden_image(model)))
 
@@ -183,13 +184,17 @@ def scaled_defaults(
     skin: Skin, data_kind: str, touch_change_ratio: float = TOUCH_CHANGE_RATIO
 ) -> Defaults:
     """Return the defaults for ``skin``: lengths in proportion to its size, and the expected change
-    in proportion to its conductivity."""
+    in proportion to its conductivity.
+
+    On a surface, a true radius is smaller on the flattened copy where the scale is greater, so the
+    range of radii is wider there. The expected change stays: a conformal copy has the same."""
     paper = Defaults()
     scale = size_to_paper(skin.outline)
+    least, most = (1.0, 1.0) if skin.surface is None else skin.surface.scale_range
     return replace(
         paper,
-        touch_min_radius_mm=_round(paper.touch_min_radius_mm * scale),
-        touch_max_radius_mm=_round(paper.touch_max_radius_mm * scale),
+        touch_min_radius_mm=_round(paper.touch_min_radius_mm * scale / max(most, 1.0)),
+        touch_max_radius_mm=_round(paper.touch_max_radius_mm * scale / min(least, 1.0)),
         touch_seed_radius_mm=_round(paper.touch_seed_radius_mm * scale),
         touch_change_s_per_m=_round(touch_change_ratio * skin.conductivity_s_per_m),
         follow_mm=_round(paper.follow_mm * scale),

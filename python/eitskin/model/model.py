@@ -1,7 +1,7 @@
 """The stored model as a Python object, with everything that maps the rows of a frame to the pixels
 of an image."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -133,7 +133,8 @@ class Model:
         Raises:
         ConfigError: the model has no description of its skin.
         """
-        return skin_from_table(self.meta.get("skin", {}), "the model's own description")
+        skin = skin_from_table(self.meta.get("skin", {}), "the model's own description")
+        return skin if self.surface is None else replace(skin, surface=self.surface)
 
     @cached_property
     def known_skin(self) -> Skin | None:

@@ -70,7 +70,7 @@ def sensitivity_of(
     fields = pairs[elements]
     products = (fields[:, :, drive] * fields[:, :, measure]).sum(axis=1)
     scale = -request.protocol.current_a * forward.thickness_m * sign
-    columns = products.T * scale[:, None] * (forward.mesh.areas_mm2[elements] * 1e-6)
+    columns = products.T * scale[:, None] * (forward.mesh.true_areas_mm2[elements] * 1e-6)
     if request.data_kind == "normalised":
         weak = np.abs(v0) < RATIO_DEFINED * np.sqrt(np.mean(v0**2))
         columns = np.where(weak, 0.0, 1 / np.where(weak, 1.0, v0))[:, None] * columns
@@ -265,6 +265,11 @@ class RandomSkins:
         at_nodes = np.cos(mesh.nodes_mm @ waves.T + phases).sum(axis=1) * np.sqrt(2 / COSINES)
         return np.asarray(at_nodes[mesh.triangles].mean(axis=1))
 
+    def _scales(self, places_mm: FloatArray) -> FloatArray:
+        """Return the true mm per mm of the plane at ``places_mm`` (k, 2), (k,)."""
+        surface = self.request.skin.surface
+        return np.ones(len(places_mm)) if surface is None else surface.at(places_mm).scale
+
     def _random_touches(self, draw: np.random.Generator) -> tuple[ShapedTouch, ...]:
         """Draw one to three touches, fewer if there is no space for them."""
         asked, outline = self.request.uncertainty, self.request.skin.outline
@@ -277,22 +282,21 @@ class RandomSkins:
             aspect, angle = draw.uniform(1, asked.touch_aspect_max), draw.uniform(0, np.pi)
             profile = ("uniform", "uniform", "hertz", "gaussian")[int(draw.integers(4))]
             places = np.column_stack([draw.uniform(x0, x1, TRIES), draw.uniform(y0, y1, TRIES)])
+            radii = radius / self._scales(places)
             inside = outline.contains(places)
             depth = np.where(
                 inside, np.linalg.norm(places[:, None] - rim, axis=2).min(axis=1), -np.inf
             )
-            fits = depth >= radius + MARGIN * self.radius_mm
+            fits = depth >= radii + MARGIN * self.radius_mm
             for other in touches:
                 away = np.hypot(places[:, 0] - other.x_mm, places[:, 1] - other.y_mm)
-                fits &= away >= radius + other.radius_mm + GAP * self.radius_mm
+                fits &= away >= radii + other.radius_mm + GAP * self.radius_mm
             if not (fits.any() or not touches):
                 continue
-            x, y = places[np.argmax(fits) if fits.any() else np.argmax(depth)]
-            touches.append(
-                ShapedTouch(
-                    float(x), float(y), radius, contrast, float(aspect), float(angle), profile
-                )
-            )
+            chosen = int(np.argmax(fits) if fits.any() else np.argmax(depth))
+            x, y = places[chosen].tolist()
+            own = float(radii[chosen])
+            touches.append(ShapedTouch(x, y, own, contrast, float(aspect), float(angle), profile))
         return tuple(touches)
 
 

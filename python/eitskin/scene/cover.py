@@ -23,6 +23,7 @@ import numpy as np
 from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.fem.mesh import Mesh
 from eitskin.fem.shaped_touch import centres_of_parts
+from eitskin.scene.chart import PlaneChart, SurfaceChart
 from eitskin.scene.random_touches import TrueTouch
 
 SUBDIVISION = 8
@@ -58,21 +59,23 @@ class Cover:
     computed once.
 
     Each element near the disc is split into ``subdivision`` squared equal triangles; the touch is
-    evaluated at their centres.
+    evaluated at their centres. On a surface, a touch has its centre at a place of the flattened
+    copy and its shape on the surface, by distances in space.
     """
 
     def __init__(self, mesh: Mesh, subdivision: int = SUBDIVISION) -> None:
-        self._corners = mesh.nodes_mm[mesh.triangles]
-        self._middles = mesh.centroids_mm()
-        self._reach = np.linalg.norm(self._corners - self._middles[:, None], axis=2).max(axis=1)
         self._weights = centres_of_parts(subdivision)
+        self._chart: PlaneChart | SurfaceChart = (
+            PlaneChart(mesh) if mesh.surface is None else SurfaceChart(mesh, mesh.surface)
+        )
+        self._corners = self._chart.element_corners
 
     def of(self, touch: TrueTouch) -> tuple[IntArray, FloatArray]:
         """Return the elements (e,) that ``touch`` meets, ascending, and the covered part of each
         (e,), in (0, 1]. For a shape this is its mean change in the element relative to that in its
         middle."""
-        near = self._near(touch)
-        part = touch.change_at(self._weights @ self._corners[near]).mean(axis=1)
+        near = self._chart.near(touch)
+        part = touch.change_at(self._chart.around(touch, near, self._weights)).mean(axis=1)
         met = part > 0
         return near[met], part[met]
 
@@ -84,7 +87,7 @@ class Cover:
         everywhere.
         """
         given = [touch for touch in touches if touch.contrast != 1.0]
-        near = [self._near(touch) for touch in given]
+        near = [self._chart.near(touch) for touch in given]
         if not sum(map(len, near)):
             return NO_CHANGE
         elements = np.unique(np.concatenate(near))
@@ -99,30 +102,27 @@ class Cover:
         tensor = _tensors(corners, sigma, normal, sharp[met])
         return Change(elements, sigma.mean(axis=1), tensor)
 
-    def _near(self, touch: TrueTouch) -> IntArray:
-        """Return the elements (e,) that ``touch`` may meet, ascending."""
-        away = np.hypot(self._middles[:, 0] - touch.x_mm, self._middles[:, 1] - touch.y_mm)
-        return np.flatnonzero(away <= touch.reach_mm + self._reach)
-
     def _inside(
         self, elements: IntArray, touches: Sequence[TrueTouch], places: Sequence[IntArray]
     ) -> tuple[FloatArray, FloatArray, BoolArray]:
         """Return the factor at the points of each of ``elements`` (e, s), the direction in which it
         grows most (e, 2), and whether one touch alone varies within the element and conducts better
         than the skin (e,). ``places`` are those of the elements near each touch."""
-        points, middles = self._weights @ self._corners[elements], self._middles[elements]
-        sigma, edges = np.ones(points.shape[:2]), np.zeros(len(elements), np.int64)
+        sigma = np.ones((len(elements), len(self._weights)))
+        edges = np.zeros(len(elements), np.int64)
         normal, most = np.zeros((len(elements), 2)), np.zeros(len(elements))
         conducts = np.zeros(len(elements), np.bool_)
         for touch, near in zip(touches, places, strict=True):
-            own = (touch.contrast - 1.0) * touch.change_at(points[near])
+            points = self._chart.around(touch, elements[near], self._weights)
+            own = (touch.contrast - 1.0) * touch.change_at(points)
             sigma[near] += own
             step = np.ptp(own, axis=1)
             edges[near] += step > 0
             wins = near[step > most[near]]
             most[near] = np.maximum(most[near], step)
             conducts[wins] = touch.contrast > 1
-            normal[wins] = np.sign(1.0 - touch.contrast) * touch.outward(middles[wins])
+            outward = self._chart.outward(touch, elements[wins])
+            normal[wins] = np.sign(1.0 - touch.contrast) * outward
         return np.maximum(sigma, MIN_FACTOR), normal, conducts & (edges == 1)
 
 

@@ -26,11 +26,22 @@ from eitskin.skin.uncertainty import (
     uncertainty_from_table,
     uncertainty_to_table,
 )
+from eitskin.surface.covered import CoveredSurface, covered_surface
+from eitskin.surface.outline import rim_circle, simplified
+from eitskin.surface.surface_map import SurfaceMap
 
-OUTLINES = ("diameter_mm", "polygon_mm", "outline")
+OUTLINES = ("diameter_mm", "polygon_mm", "outline", "surface")
 DRAWING_KEYS = ("element", "scale_mm", "tolerance_mm")
-SKIN_KEYS = ("name", *OUTLINES, *DRAWING_KEYS, "thickness_mm", "conductivity_s_per_m")
-PLACES = ("positions_mm", "fractions", "points_mm", "marked")
+SURFACE_KEYS = ("surface_unit", "link")
+SKIN_KEYS = (
+    "name",
+    *OUTLINES,
+    *DRAWING_KEYS,
+    *SURFACE_KEYS,
+    "thickness_mm",
+    "conductivity_s_per_m",
+)
+PLACES = ("positions_mm", "fractions", "points_mm", "marked", "vertices")
 ELECTRODE_KEYS = (
     "count",
     "width_mm",
@@ -47,7 +58,8 @@ PAPER_DIAMETER_MM = 194.0
 @dataclass(frozen=True)
 class Skin:
     """A conductive sheet of constant thickness with electrodes at its rim. ``uncertainty`` states
-    how far a real skin may differ from this description; None means that nothing is stated.
+    how far a real skin may differ from this description; None means that nothing is stated. A skin
+    on a ``surface`` has the outline of its flattened copy, whose rim has the true lengths.
 
     Raises:
         GeometryError: electrodes overlap, nearly touch (a gap below 5 % of their width) or are
@@ -60,6 +72,7 @@ class Skin:
     conductivity_s_per_m: float = 0.01
     thickness_mm: float = 12.0
     uncertainty: Uncertainty | None = DEFAULT_UNCERTAINTY
+    surface: SurfaceMap | None = None
 
     def __post_init__(self) -> None:
         for key in ("conductivity_s_per_m", "thickness_mm"):
@@ -148,16 +161,23 @@ def skin_from_table(table: Mapping[str, Any], where: str, folder: Path | None = 
     contacts = _subtable(table, "electrodes", where)
     try:
         drawing = _drawing_of(sheet, place, folder)
-        outline = _outline_from_table(sheet, place, drawing, contacts.get("marked"))
+        covered = _surface_of(sheet, place, folder)
+        if covered is None:
+            outline = _outline_from_table(sheet, place, drawing, contacts.get("marked"))
+        else:
+            outline = outline_on(covered.map)
         return Skin(
             name=name,
             outline=outline,
-            electrodes=_electrodes_from_table(contacts, f"{where} [electrodes]", outline, drawing),
+            electrodes=_electrodes_from_table(
+                contacts, f"{where} [electrodes]", outline, drawing, covered
+            ),
             conductivity_s_per_m=number(
                 sheet, "conductivity_s_per_m", 0.01, place, low=0, high=1e8, open_low=True
             ),
             thickness_mm=number(sheet, "thickness_mm", 12.0, place, low=0, high=1e4, open_low=True),
             uncertainty=uncertainty_from_table(table.get("uncertainty"), where),
+            surface=None if covered is None else covered.map,
         )
     except GeometryError as error:
         raise GeometryError(f"{where}: {error}") from None
@@ -246,30 +266,60 @@ def _drawing_of(sheet: Mapping[str, Any], where: str, folder: Path | None) -> Dr
     """Read the drawing that [skin] names, if it names one."""
     if sum(key in sheet for key in OUTLINES) != 1:
         raise ConfigError(
-            f"{where}: give either diameter_mm or polygon_mm, or outline = a drawing's file"
+            f"{where}: give either diameter_mm or polygon_mm, or outline = a drawing's file, or"
+            " surface = a mesh file"
         )
     if "outline" not in sheet:
         for key in DRAWING_KEYS:
             if key in sheet:
                 raise ConfigError(f"{where}: {key} goes with outline = a drawing's file; remove it")
         return None
-    name = sheet["outline"]
-    if not isinstance(name, str) or not name or "\0" in name:
-        raise ConfigError(
-            f"{where}: outline must be the name of a drawing's file in quotes, not {name!r}"
-        )
-    if folder is None:
-        raise ConfigError(
-            f"{where}: outline = {name!r} cannot be read from here; only a skin description's file"
-            " names a drawing"
-        )
+    path = _file_of(sheet, "outline", "a drawing", where, folder)
     scale = (
         number(sheet, "scale_mm", None, where, low=0, high=1e6, open_low=True)
         if "scale_mm" in sheet
         else None
     )
     tolerance = number(sheet, "tolerance_mm", TOLERANCE_MM, where, low=1e-3, high=10)
-    return read_drawing(folder / name, DrawingReading(scale, tolerance))
+    return read_drawing(path, DrawingReading(scale, tolerance))
+
+
+def _file_of(
+    sheet: Mapping[str, Any], key: str, what: str, where: str, folder: Path | None
+) -> Path:
+    """Return the path of the file that ``key`` names, which holds ``what``."""
+    name = sheet[key]
+    if not isinstance(name, str) or not name or "\0" in name:
+        raise ConfigError(
+            f"{where}: {key} must be the name of {what}'s file in quotes, not {name!r}"
+        )
+    if folder is None:
+        raise ConfigError(
+            f"{where}: {key} = {name!r} cannot be read from here; only a skin description's file"
+            f" names {what}"
+        )
+    return folder / name
+
+
+def _surface_of(sheet: Mapping[str, Any], where: str, folder: Path | None) -> CoveredSurface | None:
+    """Read the surface that [skin] names, if it names one."""
+    if "surface" not in sheet:
+        for key in SURFACE_KEYS:
+            if key in sheet:
+                raise ConfigError(f"{where}: {key} goes with surface = a mesh file; remove it")
+        return None
+    path = _file_of(sheet, "surface", "a mesh", where, folder)
+    unit = choice(sheet, "surface_unit", "mm", ("mm", "m"), where)
+    return covered_surface(path, unit, _word(sheet, "link", where) or "")
+
+
+def outline_on(surface: SurfaceMap) -> Outline:
+    """Return the outline of the flattened copy: a disk if its rim is round."""
+    rim = surface.rim_mm
+    circle = rim_circle(rim)
+    if circle is None:
+        return polygon(simplified(rim).tolist())
+    return disk(2 * circle[1])
 
 
 def _outline_from_table(
@@ -284,13 +334,17 @@ def _outline_from_table(
 
 
 def _electrodes_from_table(
-    table: Mapping[str, Any], where: str, outline: Outline, drawing: Drawing | None
+    table: Mapping[str, Any],
+    where: str,
+    outline: Outline,
+    drawing: Drawing | None,
+    covered: CoveredSurface | None,
 ) -> Electrodes:
     check_keys(table, ELECTRODE_KEYS, where)
     default = Electrodes()
     start = number(table, "start_angle_deg", default.start_angle_deg, where, low=-360, high=360)
     way = choice(table, "direction", "counterclockwise", ("clockwise", "counterclockwise"), where)
-    placed = _places(table, where, outline, drawing, start, way == "clockwise")
+    placed = _places(table, where, outline, drawing, covered, start, way == "clockwise")
     count, width, key = default.count, default.width_mm, "contact_impedance_ohm_m2"
     if placed is not None and "positions_mm" not in table:
         count = len(placed.positions_mm) if len(placed.positions_mm) <= MAX_COUNT else count
@@ -309,6 +363,7 @@ def _places(
     where: str,
     outline: Outline,
     drawing: Drawing | None,
+    covered: CoveredSurface | None,
     start_deg: float,
     clockwise: bool,
 ) -> Placed | None:
@@ -319,8 +374,8 @@ def _places(
         raise ConfigError(
             f"{where}: {given[0]} and {given[1]} both say where electrodes are; keep one"
         )
-    if "snap_mm" in table and given not in (["points_mm"], ["marked"]):
-        raise ConfigError(f"{where}: snap_mm goes with points_mm or marked; remove it")
+    if "snap_mm" in table and given not in (["points_mm"], ["marked"], ["vertices"]):
+        raise ConfigError(f"{where}: snap_mm goes with points_mm, vertices or marked; remove it")
     if not given:
         return None
     snap = number(table, "snap_mm", SNAP_MM, where, low=0, high=MAX_SIZE_MM)
@@ -333,14 +388,22 @@ def _places(
                 " file"
             )
         return by_marks(outline, drawing.marked(mark), start_deg, way, snap)
+    if covered is not None and given in (["points_mm"], ["vertices"]):
+        if given == ["points_mm"]:
+            points = _points(table, "points_mm", where, 3)
+        else:
+            points = covered.vertices_mm(_numbers(table, "vertices", where), where)
+        if not points:
+            raise ConfigError(f"{where}: {given[0]} is empty; give one entry for each electrode")
+        return by_points(outline, covered.on_rim(points, snap), start_deg, way, MAX_SIZE_MM)
+    if given == ["vertices"]:
+        raise ConfigError(f"{where}: vertices goes with surface = a mesh file; remove it")
     if given == ["points_mm"]:
         points = _points(table, "points_mm", where)
         if not points:
             raise ConfigError(f"{where}: points_mm is empty; give [x, y] for each electrode")
         return by_points(outline, points, start_deg, way, snap)
-    values = table[given[0]]
-    if not (isinstance(values, list) and all(_is_number(value) for value in values)):
-        raise ConfigError(f"{where}: {given[0]} must be a list of numbers")
+    values = _numbers(table, given[0], where)
     if given == ["fractions"]:
         return by_fractions(outline, values, clockwise)
     return Placed(tuple(float(value) for value in values), clockwise)
@@ -353,13 +416,23 @@ def _word(table: Mapping[str, Any], key: str, where: str) -> str | None:
     return value
 
 
-def _points(table: Mapping[str, Any], key: str, where: str) -> list[list[float]]:
-    points = table[key]
+def _numbers(table: Mapping[str, Any], key: str, where: str) -> list[float]:
+    values = table[key]
+    if not (isinstance(values, list) and all(_is_number(value) for value in values)):
+        raise ConfigError(f"{where}: {key} must be a list of numbers")
+    return values
+
+
+def _points(
+    table: Mapping[str, Any], key: str, where: str, dimensions: int = 2
+) -> list[list[float]]:
+    points, form = table[key], ("[x, y]", "[x, y, z]")[dimensions - 2]
     if not isinstance(points, list):
-        raise ConfigError(f"{where}: {key} must be a list of [x, y] points")
+        raise ConfigError(f"{where}: {key} must be a list of {form} points")
     for k, point in enumerate(points):
-        if not (isinstance(point, list) and len(point) == 2 and all(map(_is_number, point))):
-            raise ConfigError(f"{where}: {key} entry {k} (from 0) must be [x, y], not {point!r}")
+        good = isinstance(point, list) and len(point) == dimensions
+        if not (good and all(map(_is_number, point))):
+            raise ConfigError(f"{where}: {key} entry {k} (from 0) must be {form}, not {point!r}")
     return points
 
 

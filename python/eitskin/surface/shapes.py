@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.config import nearest
 from eitskin.errors import UsageError
+from eitskin.fileio import write_bytes
 
 Place = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -145,3 +147,14 @@ def square_net(triangles: int) -> tuple[FloatArray, IntArray]:
     first = np.where(even, np.column_stack([a, b, c]), np.column_stack([a, b, d]))
     second = np.where(even, np.column_stack([a, c, d]), np.column_stack([b, c, d]))
     return np.column_stack([x.ravel(), y.ravel()]), np.concatenate([first, second]).astype(np.int64)
+
+
+def write_obj(path: str | Path, points_mm: FloatArray, triangles: IntArray) -> None:
+    """Write a surface as an OBJ file, in mm.
+
+    Raises:
+        FileError: the file cannot be written.
+    """
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points_mm.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (triangles + 1).tolist()]
+    write_bytes(path, ("\n".join(lines) + "\n").encode())

@@ -6,7 +6,7 @@ flat mm. A thin sheet conducts alike on both, so touches are found on the copy; 
 them back to the surface.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy.typing as npt
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.surface.locate import Locator, nearest_on_segments, nearest_on_triangles
+from eitskin.surface.topology import rim_loop
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +80,24 @@ class SurfaceMap:
     ``flat_mm`` (N, 2) are the vertices of the copy and ``points_mm`` (N, 3) the same vertices on
     the surface, in the frame of ``link``. ``triangles`` (T, 3) are counterclockwise in the copy;
     seen from outside they are so on the surface. A place outside the copy takes the nearest place
-    of its rim.
+    of its rim. ``simplified_from`` is the number of triangles of the mesh file if it has been
+    simplified, else 0; a stored model does not keep it.
     """
 
     flat_mm: FloatArray
     points_mm: FloatArray
     triangles: IntArray
     link: str = ""
-    _locator: list[Locator] = field(default_factory=list, repr=False)
+    simplified_from: int = 0
+
+    @cached_property
+    def _locator(self) -> Locator:
+        return Locator(self.flat_mm, self.triangles)
+
+    @property
+    def rim_mm(self) -> FloatArray:
+        """The vertices of the copy's rim in order, counterclockwise, (B, 2)."""
+        return np.asarray(self.flat_mm[rim_loop(self.triangles)])
 
     @cached_property
     def normals(self) -> FloatArray:
@@ -103,6 +114,21 @@ class SurfaceMap:
     def scale_range(self) -> tuple[float, float]:
         """The least and the greatest scale."""
         return float(self.scales.min()), float(self.scales.max())
+
+    @property
+    def area_mm2(self) -> float:
+        """The true area."""
+        return float(np.linalg.norm(self._doubled_normals, axis=1).sum() / 2)
+
+    @property
+    def angle_error(self) -> float:
+        """The ratio of a triangle's greater to its lesser scale that 95 % of the area stay below;
+        1 where the map is conformal. Linear triangles add about their size over the radius of
+        curvature."""
+        ratio = self.stretches[:, 0] / self.stretches[:, 1]
+        order = np.argsort(ratio)
+        share = np.cumsum(self._doubled_flat_areas[order])
+        return float(ratio[order][np.searchsorted(share, 0.95 * share[-1])])
 
     def points_m(self) -> FloatArray:
         """Return the vertices on the surface in m, (N, 3)."""
@@ -127,9 +153,7 @@ class SurfaceMap:
         """Return the triangle (k,) of each place (k, 2) of the copy and the weights of its three
         corners, (k, 3)."""
         places = np.asarray(flat_mm, dtype=np.float64).reshape(-1, 2)
-        if not self._locator:
-            self._locator.append(Locator(self.flat_mm, self.triangles))
-        triangle, weight = self._locator[0].find(places)
+        triangle, weight = self._locator.find(places)
         outside = np.flatnonzero(triangle < 0)
         if len(outside):
             edges, owner, corner = self._rim
@@ -196,6 +220,17 @@ class SurfaceMap:
         triangle, weight, away = nearest_on_triangles(points, self.points_mm, self.triangles)
         flat = (weight[:, :, None] * self.flat_mm[self.triangles[triangle]]).sum(axis=1)
         return np.asarray(flat), away
+
+    def rim_places(self, points_mm: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return the places (k, 2) on the copy's rim that belong to the rim's points nearest to
+        ``points_mm`` (k, 3), and the distances to them, (k,) in mm."""
+        points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 3)
+        (begin, end), edges = self._rim[0].T, self._rim[0]
+        edge, share = nearest_on_segments(points, self.points_mm[begin], self.points_mm[end])
+        weight = np.stack([1 - share, share], axis=1)[:, :, None]
+        near = (weight * self.points_mm[edges[edge]]).sum(axis=1)
+        flat = (weight * self.flat_mm[edges[edge]]).sum(axis=1)
+        return np.asarray(flat), np.linalg.norm(points - near, axis=1)
 
     @cached_property
     def _doubled_normals(self) -> FloatArray:
