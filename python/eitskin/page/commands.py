@@ -19,7 +19,7 @@ from eitskin.device.wire.link_table import Stream
 from eitskin.errors import EitskinError, FileError, SkinTouchedError, UsageError
 from eitskin.model.eitm import decode_model
 from eitskin.page.reader import SessionReader
-from eitskin.session.robot_session import AnySession, all_of
+from eitskin.session.robot_session import AnySession, RobotSession, all_of
 from eitskin.session.session import Session
 from eitskin.session.set_up import take_reference
 from eitskin.session.settings import KINDS
@@ -235,18 +235,19 @@ class PageCommands:
 
     def record(self, on: bool) -> Future[str]:
         """Begin or end a recording in the folder."""
-        session, folder = self._one("a recording"), self._reader.folder
+        session, folder = self._board("a recording"), self._reader.folder
+        name = f"eitskin-{datetime.now():%Y%m%d-%H%M%S}"
+        if not isinstance(session, Session):
+            return self._record_robot(session, on, folder / name)
 
         def action(device: Device) -> str:
             done = self._end_recording(session)
             if not on:
                 return done or "nothing is being recorded"
-            path = _free(folder / f"eitskin-{datetime.now():%Y%m%d-%H%M%S}.eits")
+            path = _free(folder / f"{name}.eits")
 
             def failed(error: FileError) -> None:  # the disk is full: the view goes on
-                self._reader.report(
-                    "notice", {"kind": "session", "text": str(error), "time_s": None}
-                )
+                self._failed(error)
                 self._changed(session, lambda device: self._end_recording(session))
 
             session.recorder = Recorder(
@@ -255,6 +256,30 @@ class PageCommands:
             return f"recording to {path.name}"
 
         return self._changed(session, action)
+
+    def _record_robot(self, robot: RobotSession, on: bool, folder: Path) -> Future[str]:
+        """The same of all skins, each in a file of a new folder."""
+        begun = robot.folder
+        if on and begun is not None:
+            raise UsageError(f"{robot.name} is being recorded to {begun.name} already")
+        if not on and begun is None:
+            raise UsageError("nothing is being recorded")
+        place = _free(folder) if begun is None else begun
+        done = robot.begin_recording(place, self._failed) if on else robot.end_recording()
+        answer: Future[str] = Future()
+
+        def answered(result: "Future[Any]") -> None:
+            self._reader.report("setup", {})
+            if error := result.exception():
+                answer.set_exception(error)
+            else:
+                answer.set_result(f"{'recording to' if on else 'ended'} {place.name}")
+
+        done.add_done_callback(answered)
+        return answer
+
+    def _failed(self, error: FileError) -> None:
+        self._reader.report("notice", {"kind": "session", "text": str(error), "time_s": None})
 
     def _end_recording(self, session: Session) -> str:
         """End the recording, if there is one, and say what was recorded."""
@@ -294,8 +319,7 @@ class PageCommands:
         session = self._board(what)
         if not isinstance(session, Session):
             raise UsageError(
-                f"{session.name} is a robot: {what} is of one skin here; view that alone, or use"
-                "  eitskin record  for all"
+                f"{session.name} is a robot: {what} belongs to one skin; view that skin alone"
             )
         return session
 

@@ -80,13 +80,20 @@ def setup_text(whole: AnySession, may_command: bool, length_s: float | None = No
         "sign": None if solver is None else solver.sign,
         "iterations": None if solver is None else solver.iterations,
         "preset": "" if how.preset is None else how.preset.name,
-        "recording": None if session.recorder is None else session.recorder.path.name,
+        "recording": _recording(whole),
         "model_crc": f"{board.model_crc:08x}",
         "zones": [asdict(zone) for zone in how.zones],
         "skin": _skin(session),
         "skins": [_one(name, part, whole.bases.get(name)) for name, part in whole.parts.items()],
     }
     return text_of("setup", **facts)
+
+
+def _recording(whole: AnySession) -> str | None:
+    """The name of the file, or of a robot's folder, that is being recorded to."""
+    if isinstance(whole, Session):
+        return None if whole.recorder is None else whole.recorder.path.name
+    return None if whole.folder is None else whole.folder.name
 
 
 def _one(name: str, session: Session, base: Pose | None) -> dict[str, Any]:

@@ -12,14 +12,16 @@ from collections import deque
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, TypeAlias
 
 from eitskin.core.gestures import GestureEvent
 from eitskin.device.client import TARE_FRAMES
 from eitskin.device.link import Reconnect
 from eitskin.device.pacing import Pacer, WallClock
+from eitskin.device.recordings.recording import Recorder
 from eitskin.device.timing import check_speed
-from eitskin.errors import DeviceError, EitskinError, UsageError
+from eitskin.errors import DeviceError, EitskinError, FileError, UsageError
 from eitskin.robot.description import Robot, RobotSkin, is_robot, looped, open_robot
 from eitskin.robot.pose import Pose
 from eitskin.robot.recorded import begin_folder, skin_file, write_recorded
@@ -78,7 +80,7 @@ class RobotSkinSession:
         self.waiting: deque[tuple[int, Message]] = deque()
         self.started = self.over = False
         self.room = threading.Condition(robot.lock)
-        self.starts_us: int | None = None  # the first frame's time
+        self.starts_us: int | None = None  # of the stream's, or the recording's, first frame
         self._clock, self._last_s = HostClock(), 0.0
         self._thread = threading.Thread(target=self._run, name=f"eitskin {skin.name}", daemon=True)
 
@@ -112,6 +114,20 @@ class RobotSkinSession:
 
     def begin(self) -> None:
         self._thread.start()
+
+    def record(self, folder: Path, failed: Callable[[FileError], object]) -> None:
+        """Record into ``folder`` from the next frame on; to be called in the session's ``ask``."""
+        session, file = self.session, skin_file(folder, self.skin.name)
+        session.recorder = Recorder(
+            file, session.device, session.solver, name=self.skin.name, failed=failed
+        )
+        self.starts_us = None
+
+    def end_recording(self) -> None:
+        """Likewise in ``ask``."""
+        recorder, self.session.recorder = self.session.recorder, None
+        if recorder is not None:
+            recorder.close()
 
     def join(self, timeout_s: float) -> None:
         if self._thread.ident is not None:
@@ -281,6 +297,7 @@ class RobotSession:
     Attributes:
         parts: the session of each skin that is under way, by the skin's name.
         consumers: each gets every message before ``messages`` gives it.
+        folder: that is being recorded into; None: none.
     """
 
     def __init__(
@@ -313,6 +330,7 @@ class RobotSession:
         self.began_ns = 0  # of the clock that all skins share
         self._starting, self._threads = threading.RLock(), False
         self._error: BaseException | None = None
+        self.folder = self.settings.record
         self._skins = [RobotSkinSession(self, one, k) for k, one in enumerate(robot.skins)]
 
     def __enter__(self) -> "RobotSession":
@@ -433,6 +451,32 @@ class RobotSession:
         parts = self.parts.items()
         return all_of({name: one.tare(frames, anyway=anyway) for name, one in parts})
 
+    def begin_recording(self, folder: Path, failed: Callable[[FileError], object]) -> "Future[Any]":
+        """Record every skin into the new ``folder`` from its next frame on; ``failed`` gets the
+        error if a file cannot be written any more. A board that is lost is not recorded after
+        that.
+
+        Raises:
+            FileError: the folder cannot be made.
+        """
+        begin_folder(self.robot, folder)
+        self.folder = folder
+        return self._ask_each(lambda skin: skin.record(folder, failed))
+
+    def end_recording(self) -> "Future[Any]":
+        """End what ``begin_recording`` began, and say in ``robot.toml`` when each skin began."""
+        done = self._ask_each(lambda skin: skin.end_recording())
+        done.add_done_callback(lambda _: self._write_recorded())
+        return done
+
+    def _ask_each(self, action: Callable[[RobotSkinSession], None]) -> "Future[Any]":
+        def asked(skin: RobotSkinSession) -> "Future[None]":
+            return skin.session.ask(lambda device: action(skin))
+
+        answers = {one.skin.name: asked(one) for one in self._skins}
+        self.pacer.wake()
+        return all_of(answers)
+
     def messages(self) -> Generator[Message, None, None]:
         """What comes from all skins, until all scenes, recordings or numbers of frames are over."""
         advice = "RobotSession.stop() ends it from any thread"
@@ -507,7 +551,7 @@ class RobotSession:
             skin.join(end_s - time.monotonic())
 
     def _write_recorded(self) -> None:
-        folder = self.settings.record
+        folder, self.folder = self.folder, None
         if folder is not None and self._error is None and folder.is_dir():
             starts_s = {one.skin.name: (one.starts_us or 0) / 1e6 for one in self._skins}
             write_recorded(self.robot, folder, starts_s)

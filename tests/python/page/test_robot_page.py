@@ -9,17 +9,20 @@ import pytest
 from served import TOKEN, serving
 from websockets.sync.client import ClientConnection, connect
 
+import eitskin
 from eitskin.page.facts import HEAD
 from eitskin.page.hub import IN_FLIGHT, Outgoing, PageClient
 from eitskin.page.server import PageServer
+from eitskin.robot.description import load_robot
 
 ARM = Path(__file__).resolve().parents[3] / "examples" / "robot" / "arm.urdf"
 SKINS = ["upper_arm", "forearm", "palm"]
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[PageServer]:
-    with serving(f"robot:{ARM}?loop=1") as one:
+def server(tmp_path_factory) -> Iterator[PageServer]:
+    folder = tmp_path_factory.mktemp("recordings")
+    with serving(f"robot:{ARM}?loop=1", folder=folder) as one:
         yield one
 
 
@@ -59,12 +62,20 @@ def test_a_page_follows_every_skin_and_commands_all(server):
             ("pause", None, "paused"),
             ("sign", "both", "solver: sign both"),
             ("play", None, "playing"),
-            ("record", True, "arm is a robot"),
+            ("record", True, "recording to eitskin-"),
+            ("record", True, "is being recorded to eitskin-"),
+            ("undo-tare", None, "stop the recording first"),
+            ("record", False, "ended eitskin-"),
+            ("record", False, "nothing is being recorded"),
         ):
             line.send(json.dumps({"type": "do", "do": what, "value": value}))
             while (message := read(line))["type"] != "answer":
                 pass
             assert text in message["text"], message
+    (recorded,) = server.reader.folder.iterdir()
+    starts_s = [skin.starts_s for skin in load_robot(recorded / "robot.toml").skins]
+    assert min(starts_s) > 0 and max(starts_s) - min(starts_s) < 0.5
+    assert {f.source for f in eitskin.stream(str(recorded / "robot.toml"))} == set(SKINS)
     assert {part.settings.solver.sign for part in server.reader.live().parts.values()} == {"both"}
 
 
