@@ -4,6 +4,7 @@ with the truth."""
 import argparse
 import sys
 from collections.abc import Callable
+from importlib.util import find_spec
 from itertools import count
 
 from eitskin.cli.arguments import Output, option
@@ -99,7 +100,10 @@ def _drawn(picture: Output, done: demo.Demo, draw: Callable[[Output, demo.Demo],
 def _board(step: Callable[[str], None]) -> demo_board.BoardDemo | None:
     """Find the same touches on the emulated board. If emulator or firmware are not installed, print
     the reason on stderr and return None."""
-    step("running the firmware on an emulated board; this takes ten to thirty seconds")
+    if find_spec("eitskin_emulator") is None:
+        step("the firmware on an emulated board: left out")
+    else:
+        step("running the firmware on an emulated board; this takes ten to thirty seconds")
     try:
         return demo_board.run_board_demo(BOARD)
     except (MissingExtraError, FileError) as error:

@@ -26,6 +26,8 @@ def test_the_demo_needs_only_the_plain_dependencies(tmp_path):
     assert (facts["hits"], facts["false"], facts["picture"], facts["board"]) == (3, 0, None, None)
     assert max(facts["position_errors_mm"]) < 1
     assert "without the picture: this needs matplotlib" in done.stderr
+    assert "the firmware on an emulated board: left out" in done.stderr + done.stdout
+    assert "ten to thirty seconds" not in done.stderr + done.stdout
     assert list(tmp_path.iterdir()) == []
 
 
