@@ -14,7 +14,7 @@ set(EITSKIN_CORE_SOURCES
     solve/solve.c solve/duality_gap.c solve/fista.c solve/working_set.c
     solve/active_set.c solve/violations.c solve/active_columns.c
     touch/disc.c touch/interaction.c touch/disc_fit.c touch/prune.c touch/split_merge.c touch/seek.c
-    touch/touch.c touch/tracker.c
+    touch/touch.c
     evidence/covariance.c evidence/shape.c evidence/likelihood.c evidence/verdict.c
     evidence/elimination.c evidence/touch_test.c
     evidence/confidence.c evidence/ellipse.c evidence/pair.c

@@ -79,7 +79,7 @@ def stream(
         speed: of what is simulated, emulated or recorded; 1 is as it was, 0 as fast as it can.
         name: of the board, skin or source in every message (None: the URL's, else the
             one in the board's settings, else its serial number).
-        solver: ``sign``, ``iterations``, ``track`` and what else SolverSettings has.
+        solver: ``sign``, ``iterations`` and what else SolverSettings has.
 
     Raises:
         EitskinError: the board cannot be opened or set up, its stream fails, or a sink cannot be

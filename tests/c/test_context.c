@@ -200,15 +200,11 @@ TEST(default_options)
     CHECK_NEAR(o.touch_change_s_per_m, 0, 0);
     CHECK_NEAR(o.touch_radius_weight, 1e-3f, 0);
     CHECK_NEAR(o.follow_mm, 25, 0);
-    CHECK(o.track_confirm == 0 && o.track_hold == 0 && o.track_smooth == 0);
     const eits_options usual = o;
     CHECK_REFUSED(eits_options_track(NULL));
     CHECK_OK(eits_options_track(&o));
     CHECK_NEAR(o.detection_factor, 0.75 * 1.2f, 1e-7);
-    CHECK(o.track_confirm == 2 && o.track_hold == 2 && o.track_smooth == R(0.66));
     o.detection_factor = usual.detection_factor; /* and nothing else */
-    o.track_confirm = o.track_hold = 0;
-    o.track_smooth = 0;
     uint32_t count = 0;
     const eits_option *option = eits_option_table(&count);
     CHECK(count > 0);
@@ -263,9 +259,6 @@ TEST(options_out_of_range)
         REAL_WRONG(touch_radius_weight),
         REAL_WRONG(follow_mm),
         REAL_WRONG(regularisation_noise_factor),
-        WORD(track_confirm, 1001),
-        WORD(track_hold, 1001),
-        REAL_WRONG(track_smooth),
     };
     eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = 3, .side = 3}, 0);
     const eits_options before = *eits_get_options(ctx);
@@ -285,8 +278,6 @@ TEST(options_out_of_range)
     o.max_touches = 0;
     o.max_masked = UINT32_MAX;
     o.touch_sweeps = 1000;
-    o.track_confirm = o.track_hold = EITS_MAX_TRACK_FRAMES;
-    o.track_smooth = R(1e30);
     o.lambda_rel = o.gap_rel = o.touch_threshold = o.touch_min_fraction = 1;
     o.lambda_abs = o.detection_factor = o.lambda_noise_factor = o.saturation_v = o.follow_mm =
         o.touch_change_s_per_m = R(1e30);

@@ -1,68 +1,301 @@
-/* A frame's touches of those that drives follow and those that the solver found. */
-#include "check.h"
+/* A frame's touches: those that drives follow, with what the solver found of them, and those that
+ * frames alone show, followed from frame to frame. */
+#include "steps.h"
 
-#include "eitskin/fast.h"
 #include "fast/fast.h"
 
-static eits_fast_touch followed(uint32_t id, double x_mm, double strength)
+static dense_bench b;
+static void *memory;
+static eits_fast *fast;
+static eits_touch t[EITS_MAX_TOUCHES];
+
+/* A 120 mm square around the origin; a frame whose lambda_max is ten times that of noise. */
+static void set_up(void)
 {
-    return (eits_fast_touch){.id = id,
-                             .x_mm = (eits_real)x_mm,
-                             .strength_s_per_m_mm2 = (eits_real)strength,
-                             .radius_mm = 7};
+    eits_context *ctx = dense_bench_open(&b, (small_spec){.rank = 8, .side = 20}, 0);
+    const size_t size = eits_fast_size(&b.c.model);
+    free(memory);
+    memory = aligned_alloc(16, size);
+    CHECK_OK(eits_fast_init(memory, size, ctx, &fast));
+    ctx->info.lambda_max = 10;
+    ctx->info.lambda_noise = 1;
 }
 
-static eits_touch found_at(uint32_t id, double x_mm, double strength)
+/* Its own lambda_max is 10 sqrt(explained) times the noise's: faint from 0.009 down; above 0.05 it
+ * is clear. */
+static eits_touch at(double x, double y, double explained)
 {
-    return (eits_touch){.id = id,
-                        .x_mm = (eits_real)x_mm,
-                        .strength_s_per_m_mm2 = (eits_real)strength,
+    return (eits_touch){.x_mm = (eits_real)x,
+                        .y_mm = (eits_real)y,
                         .radius_mm = 9,
-                        .explained = (eits_real)0.5};
+                        .strength_s_per_m_mm2 = 1,
+                        .explained = (eits_real)explained,
+                        .confidence = 1};
+}
+
+static uint32_t report(const eits_touch *found, uint32_t count)
+{
+    uint32_t reported = 99;
+    CHECK_OK(eits_fast_report(fast, found, count, t, &reported));
+    return reported;
+}
+
+static uint32_t one(double x, double explained)
+{
+    const eits_touch found = at(x, 0, explained);
+    return report(&found, 1);
+}
+
+static uint32_t none(void)
+{
+    return report(t, 0);
+}
+
+/* As after eits_fast_align: drives follow these. */
+static void drives_follow(const eits_fast_touch *touches, uint32_t count)
+{
+    fast->aligned = fast->driven = 1;
+    fast->n_followed = count;
+    for (uint32_t k = 0; k < count; ++k)
+        fast->followed[k] = touches[k];
 }
 
 TEST(wrong_arguments)
 {
-    eits_touch touches[EITS_MAX_TOUCHES];
     uint32_t count;
-    CHECK(eits_fast_report(NULL, 0, NULL, 0, NULL, 0, NULL, &count) == EITS_E_ARGUMENT);
-    CHECK(eits_fast_report(NULL, 0, NULL, 0, NULL, 0, touches, NULL) == EITS_E_ARGUMENT);
-    CHECK(eits_fast_report(NULL, EITS_FAST_TOUCHES + 1, NULL, 0, NULL, 0, touches, &count) ==
-          EITS_E_ARGUMENT);
-    CHECK(eits_fast_report(NULL, 0, NULL, EITS_MAX_TOUCHES + 1, NULL, 0, touches, &count) ==
-          EITS_E_ARGUMENT);
-    CHECK(eits_fast_report(NULL, 0, NULL, 0, NULL, EITS_MAX_TOUCHES + 1, touches, &count) ==
-          EITS_E_ARGUMENT);
-    CHECK(eits_fast_report(NULL, 0, NULL, 0, NULL, 0, touches, &count) == EITS_OK && count == 0);
+    set_up();
+    CHECK_EQUAL(eits_fast_report(NULL, t, 0, t, &count), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_report(fast, t, 0, NULL, &count), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_report(fast, t, 0, t, NULL), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_report(fast, NULL, 1, t, &count), EITS_E_ARGUMENT);
+    CHECK_EQUAL(eits_fast_report(fast, t, EITS_MAX_TOUCHES + 1, t, &count), EITS_E_ARGUMENT);
+    CHECK_EQUAL(report(NULL, 0), 0);
+}
+
+/* A model without fields has no drives, and its frames have touches all the same. */
+TEST(without_fields)
+{
+    uint32_t count = 0;
+    set_up();
+    CHECK_EQUAL(eits_fast_drives(fast), 0);
+    CHECK(eits_fast_rows(fast, 0, &count) == NULL);
+    CHECK_EQUAL(eits_fast_drive(fast, 0, b.c.ctx->reference.v0, 13, 0), EITS_E_ARGUMENT);
+    CHECK_EQUAL(one(0, 0.5), 1);
+    CHECK_EQUAL(eits_fast_begin(fast), EITS_E_NO_REFERENCE);
+    CHECK_EQUAL(one(0, 0.5), 1);
+    CHECK(t[0].id == 1 && t[0].confirmed == 1);
+    eits_fast_forget_all(NULL);
+    eits_fast_forget_all(fast);
+    CHECK_EQUAL(one(0, 0.5), 1);
+    CHECK(t[0].id == 2 && t[0].confirmed == 0);
 }
 
 /* The nearer touch that was found gives its place and shape, the one followed its id; what is not
  * found is reported as followed. The strongest comes first. */
 TEST(a_followed_touch_is_what_was_found_near_it)
 {
-    const eits_fast_touch tracked[] = {followed(3, 0, 1), followed(4, 50, 2)};
-    const eits_touch found[] = {found_at(1, 5, 4), found_at(2, 1, 3)};
-    eits_touch touches[EITS_MAX_TOUCHES];
-    uint32_t count;
-    CHECK(eits_fast_report(tracked, 2, found, 2, NULL, 0, touches, &count) == EITS_OK);
-    CHECK(count == 2);
-    CHECK(touches[0].id == 3 && touches[0].x_mm == 1 && touches[0].radius_mm == 9);
-    CHECK(touches[0].confirmed == 1);
-    CHECK(touches[1].id == 4 && touches[1].x_mm == 50 && touches[1].radius_mm == 7);
-    CHECK(touches[1].confirmed == 0 && touches[1].explained == 0);
+    const eits_fast_touch followed[] = {
+        {.id = 3, .strength_s_per_m_mm2 = 1, .radius_mm = 7, .x_variance_mm2 = 2},
+        {.id = 4, .x_mm = 50, .strength_s_per_m_mm2 = 2, .radius_mm = 7, .x_variance_mm2 = 2}};
+    eits_touch found[] = {at(5, 0, 0.5), at(1, 0, 0.5)};
+    set_up();
+    found[1].strength_s_per_m_mm2 = 3;
+    drives_follow(followed, 2);
+    CHECK_EQUAL(report(found, 2), 2);
+    CHECK(t[0].id == 3 && t[0].x_mm == 1 && t[0].radius_mm == 9 && t[0].confirmed == 1);
+    CHECK(t[1].id == 4 && t[1].x_mm == 50 && t[1].radius_mm == 7 && t[1].x_variance_mm2 == 2);
+    CHECK(t[1].confirmed == 0 && t[1].explained == 0);
+    drives_follow(followed, 2); /* a frame that was not solved */
+    CHECK_EQUAL(report(NULL, 0), 2);
+    CHECK(t[0].id == 4 && t[1].id == 3 && t[1].x_mm == 0);
+    CHECK_EQUAL(report(NULL, 0), 0); /* the report of a frame is made once */
 }
 
-/* A touch that drives do not follow counts from its second frame on, once for each touch before. */
-TEST(a_touch_of_frames_alone_was_there_before)
+/* A touch that no drive follows counts from its second frame on, however clear it is. A frame that
+ * was not solved is none, and nothing is held. */
+TEST(a_touch_beside_those_of_drives)
 {
-    const eits_touch found[] = {found_at(1, -40, 5), found_at(2, -42, 4)};
-    const eits_touch before[] = {found_at(7, -41, 5)};
-    eits_touch touches[EITS_MAX_TOUCHES];
-    uint32_t count;
-    CHECK(eits_fast_report(NULL, 0, found, 2, NULL, 0, touches, &count) == EITS_OK && count == 0);
-    CHECK(eits_fast_report(NULL, 0, found, 2, before, 1, touches, &count) == EITS_OK);
-    CHECK(count == 1);
-    CHECK(touches[0].id == EITS_FAST_FRAME_IDS + 1 && touches[0].confirmed == 1);
+    const eits_touch found = at(-40, 0, 0.005), clear = at(40, 0, 0.5);
+    set_up();
+    for (int frame = 0; frame < 6; ++frame) {
+        drives_follow(NULL, 0);
+        CHECK_EQUAL(report(&found, 1), frame > 0);
+        CHECK(frame == 0 || (t[0].id == EITS_FAST_FRAME_IDS + 1 && t[0].confirmed == 1));
+        drives_follow(NULL, 0);
+        CHECK_EQUAL(report(NULL, 0), 0);
+    }
+    drives_follow(NULL, 0);
+    CHECK_EQUAL(report(&clear, 1), 0);
 }
 
-RUN_TESTS("fast_report")
+/* Ids of drives begin after those that frames have given. */
+TEST(ids_are_given_once)
+{
+    set_up();
+    CHECK_EQUAL(one(0, 0.5), 1);
+    CHECK_EQUAL(fast->next_id, 1);
+    (void)eits_fast_begin(fast);
+    CHECK_EQUAL(fast->next_id, 2);
+    fast->driven = 1;
+    CHECK_EQUAL(one(0, 0.5), 1); /* still the same touch */
+    CHECK_EQUAL(t[0].id, 1);
+    eits_fast_forget_all(fast);
+    CHECK_EQUAL(one(0, 0.5), 1);
+    CHECK_EQUAL(t[0].id, EITS_FAST_FRAME_IDS + 2);
+    fast->seen_ids = UINT32_MAX - EITS_FAST_FRAME_IDS - 1;
+    eits_touch four[4] = {at(-50, 50, 0.5), at(50, 50, 0.5), at(-50, -50, 0.5), at(50, -50, 0.5)};
+    CHECK_EQUAL(report(four, 4), 4);
+    CHECK(t[0].id == UINT32_MAX && t[1].id == 1 && t[2].id == 2); /* never 0 */
+}
+
+/* Clear ones at once, unconfirmed; others with the second frame. */
+TEST(touches_start)
+{
+    set_up();
+    CHECK_EQUAL(one(0, 0.5), 1);
+    CHECK(t[0].id == 1 && t[0].confirmed == 0 && t[0].x_mm == 0);
+    CHECK_EQUAL(one(1, 0.5), 1);
+    CHECK(t[0].id == 1 && t[0].confirmed == 1 && t[0].x_mm == 1);
+    eits_fast_forget_all(fast);
+    for (int round = 0; round < 3; ++round) { /* a flicker is never reported, and takes no id */
+        CHECK_EQUAL(one(0, 0.005), 0);
+        CHECK_EQUAL(none(), 0);
+    }
+    CHECK_EQUAL(one(0, 0.005), 0);
+    CHECK_EQUAL(one(1, 0.005), 1);
+    CHECK(t[0].id == 2 && t[0].confirmed == 1 && t[0].x_mm == 1);
+    CHECK_EQUAL(one(40, 0.04), 0); /* clear, but perhaps a part of another */
+    eits_fast_forget_all(fast);
+    b.c.ctx->info.lambda_noise = 5; /* a large part of a frame that is little more than noise */
+    CHECK_EQUAL(one(0, 0.2), 0);
+    eits_fast_forget_all(fast);
+    b.c.ctx->info.lambda_noise = 2; /* 1.2 times noise: not faint, and not clear either */
+    CHECK_EQUAL(one(0, 0.06), 0);
+    eits_fast_forget_all(fast);
+    b.c.ctx->info.lambda_noise = 0; /* unknown: nothing is doubtful */
+    CHECK_EQUAL(one(0, 0.005), 1);
+}
+
+/* A doubtful touch must be found again near by; one that was reported may move further. */
+TEST(reach)
+{
+    set_up(); /* follow_mm 25 */
+    CHECK_EQUAL(one(0, 0.005), 0);
+    CHECK_EQUAL(one(15.1, 0.005), 0);
+    CHECK_EQUAL(one(0.2, 0.005), 1);
+    eits_fast_forget_all(fast);
+    CHECK_EQUAL(one(0, 0.5), 1);
+    CHECK_EQUAL(one(24.9, 0.5), 1);
+    CHECK_EQUAL(t[0].id, 2);
+    eits_fast_forget_all(fast);
+    CHECK_EQUAL(one(0, 0.5), 1);
+    CHECK_EQUAL(one(25.1, 0.5), 1);
+    CHECK_EQUAL(t[0].id, 4);
+    /* nearer to the doubtful touch than its own finger: the one that was reported chooses first */
+    eits_fast_forget_all(fast);
+    const eits_touch before[2] = {at(0, 0, 0.5), at(30, 0, 0.005)};
+    const eits_touch after[2] = {at(20, 0, 0.5), at(0, 40, 0.5)};
+    CHECK_EQUAL(report(before, 2), 1);
+    CHECK_EQUAL(report(after, 2), 2);
+    CHECK(t[0].id == 5 && t[1].id == 6);
+}
+
+/* A clear touch that is lifted is gone at once, though its id is kept for two frames; a faint one
+ * that is well known is reported meanwhile, where it was. */
+TEST(touches_end)
+{
+    set_up();
+    for (int k = 0; k < 10; ++k)
+        CHECK_EQUAL(one(0, 0.5), 1);
+    CHECK_EQUAL(none(), 0);
+    CHECK_EQUAL(none(), 0);
+    CHECK_EQUAL(one(5, 0.005), 1); /* it was reported before */
+    CHECK_EQUAL(t[0].id, 1);
+    for (int k = 0; k < 2; ++k) {
+        CHECK_EQUAL(none(), 1);
+        CHECK(t[0].id == 1 && t[0].x_mm == 5 && t[0].explained == 0 && t[0].confidence == 0 &&
+              t[0].strength_s_per_m_mm2 == 1 && t[0].confirmed == 1);
+    }
+    CHECK_EQUAL(none(), 0);
+    CHECK_EQUAL(one(5, 0.5), 1); /* too late: another */
+    CHECK_EQUAL(t[0].id, 2);
+    eits_fast_forget_all(fast);
+    for (int k = 0; k < 3; ++k)
+        CHECK_EQUAL(one(0, 0.005), k > 0);
+    CHECK_EQUAL(none(), 0); /* found three times only: it may have been noise */
+    CHECK_EQUAL(one(0, 0.005), 1);
+    CHECK_EQUAL(t[0].id, 3);
+    CHECK_EQUAL(none(), 1);
+    b.c.ctx->options.max_touches = 0; /* no more are reported because they are held */
+    CHECK_EQUAL(none(), 0);
+}
+
+/* Touches that are waited for never take the place of found ones, and ids follow each of them. */
+TEST(a_full_house)
+{
+    eits_touch all[EITS_MAX_TOUCHES], others[EITS_MAX_TOUCHES];
+    set_up();
+    for (int round = 0; round < 5; ++round) {
+        for (int k = 0; k < EITS_MAX_TOUCHES; ++k) { /* listed in another order each time */
+            const int which = (k * 7 + round * 3) % EITS_MAX_TOUCHES;
+            all[k] = at(30.0 * (which % 4) - 45 + round, 30.0 * (which / 4) - 45, 0.5);
+            all[k].radius_mm = (eits_real)which;
+            others[k] = at(30.0 * (which % 4) - 1000, 30.0 * (which / 4), 0.5);
+        }
+        CHECK_EQUAL(report(all, EITS_MAX_TOUCHES), EITS_MAX_TOUCHES);
+        for (int k = 0; k < EITS_MAX_TOUCHES; ++k)
+            CHECK_EQUAL((eits_real)(t[k].id - 1), (eits_real)((int)t[k].radius_mm * 7 % 16));
+    }
+    CHECK_EQUAL(report(others, EITS_MAX_TOUCHES), EITS_MAX_TOUCHES);
+    CHECK(t[0].id == EITS_MAX_TOUCHES + 1 && t[EITS_MAX_TOUCHES - 1].id == 2 * EITS_MAX_TOUCHES);
+    CHECK_EQUAL(none(), 0);
+}
+
+/* Nearest pairs first; where one touch becomes two, the nearer keeps the id. */
+TEST(nearest_first)
+{
+    set_up();
+    const eits_touch first[3] = {at(0, 0, 0.5), at(20, 0, 0.5), at(40, 0, 0.5)};
+    const eits_touch moved[3] = {at(12, 0, 0.5), at(21, 0, 0.5), at(90, 0, 0.5)};
+    CHECK_EQUAL(report(first, 3), 3);
+    CHECK_EQUAL(report(moved, 3), 3);
+    CHECK(t[0].id == 1 && t[1].id == 2 && t[2].id == 4);
+    eits_fast_forget_all(fast);
+    const eits_touch two[2] = {at(1, 1, 0.5), at(-0.5, 1, 0.5)};
+    CHECK_EQUAL(report(first, 1), 1);
+    CHECK_EQUAL(report(two, 2), 2);
+    CHECK(t[1].id == 5 && t[0].id == 6);
+}
+
+/* Two fingers that pass one another keep their ids by where they are going: the nearest place is
+ * the other's. */
+TEST(passing)
+{
+    set_up();
+    for (int k = 0; k <= 10; ++k) {
+        eits_touch two[2] = {at(-31.5 + 7 * k, 2, 0.5), at(31.5 - 7 * k, -2, 0.4)};
+        two[0].strength_s_per_m_mm2 = 2;
+        CHECK_EQUAL(report(two, 2), 2);
+        CHECK(t[0].id == 1 && t[1].id == 2);
+        CHECK(t[0].x_mm == two[0].x_mm); /* places are as they were found */
+    }
+}
+
+/* Options and noise at the ends of their ranges: places are numbers, ids are given. */
+TEST(extremes)
+{
+    static const double huge[] = {0, 1e-30, 1e30};
+    for (int k = 0; k < 9; ++k) {
+        set_up();
+        b.c.ctx->options.follow_mm = (eits_real)huge[k % 3];
+        b.c.ctx->info.lambda_noise = (eits_real)huge[k / 3];
+        for (int frame = 0; frame < 9; ++frame) {
+            const uint32_t count = frame == 5 ? none() : one(frame, frame == 2 ? 0 : 0.5);
+            for (uint32_t l = 0; l < count; ++l)
+                CHECK(t[l].id != 0 && eits_is_finite(t[l].x_mm));
+        }
+        CHECK(fast->n_seen > 0 && eits_all_finite(fast->seen[0].at, 2));
+    }
+}
+
+RUN_TESTS("fast_report", dense_bench_close(&b); free(memory))

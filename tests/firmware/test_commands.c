@@ -20,7 +20,7 @@ TEST(test_lengths)
         uint32_t size;
     } expected[] = {
         {EITS_PACKET_GET_INFO, 4},     {EITS_PACKET_STREAM, 12},   {EITS_PACKET_TARE, 8},
-        {EITS_PACKET_SCAN, 24},        {EITS_PACKET_SOLVER, 44},   {EITS_PACKET_MODEL_BEGIN, 12},
+        {EITS_PACKET_SCAN, 24},        {EITS_PACKET_SOLVER, 40},   {EITS_PACKET_MODEL_BEGIN, 12},
         {EITS_PACKET_MODEL_COMMIT, 4}, {EITS_PACKET_GET_STATS, 8}, {EITS_PACKET_MASK_ROW, 8},
         {EITS_PACKET_RESET, 4},        {EITS_PACKET_SELF_TEST, 4}, {EITS_PACKET_CLEAR_FAULTS, 4}};
     for (size_t k = 0; IN_TABLE(k, expected); ++k) {
@@ -246,9 +246,7 @@ TEST(test_solver)
     SOLVER(c.solver = 2, 28, 3); /* reserved */
     SOLVER(c.solver = 4, 28, 3);
     SOLVER(c.diagnostics = EITS_DIAGNOSTICS_ALL + 1, 36, EITS_DIAGNOSTICS_ALL);
-    SOLVER(c.track = 2, 40, 1);
     const eits_options *options = eits_get_options(b.host.instrument.solve.engine.ctx);
-    CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
     CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7);
     CHECK_EQUAL(options->warm_start, 0);
     CHECK_EQUAL(options->mac_limit, 0);
@@ -267,16 +265,7 @@ TEST(test_solver)
     CHECK_EQUAL(options->solver, EITS_SOLVER_ACTIVE_SET);
     CHECK_EQUAL(options->diagnostics, EITS_DIAGNOSTIC_OUTLIER);
     CHECK_EQUAL(options->mac_limit, 123456);
-    CHECK(options->track_confirm == 0 && options->track_hold == 0 && options->track_smooth == 0);
-    CHECK_NEAR(options->detection_factor, 1.2f, 0);
-    c = good;
-    c.track = 1;
-    for (int k = 0; k < 2; ++k) { /* as after a start, and not a quarter lower each time */
-        REPLY(solver_with(c), EITS_REPLY_OK, 0, 0);
-        c.iterations += 1; /* a new command, not the last one repeated */
-    }
-    CHECK(options->track_confirm == 2 && options->track_hold == 2 && options->track_smooth > 0);
-    CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7);
+    CHECK_NEAR(options->detection_factor, 0.75 * 1.2f, 1e-7); /* stays that of streams */
 }
 
 TEST(test_mask_row)

@@ -10,6 +10,8 @@
 static struct mirror {
     eits_context *ctx;
     _Alignas(16) uint8_t workspace[FAKE_WORKSPACE];
+    _Alignas(16) uint8_t tracker[FAKE_WORKSPACE];
+    eits_fast *fast;
     uint32_t taken; /* packets seen */
     uint32_t images, touches, frames_of_events, events, different;
     eits_gestures gestures;
@@ -29,6 +31,7 @@ static void mirror_start(uint32_t untouched)
     options.warm_start = 1; /* for both, so that a frame depends on earlier ones */
     b.host.instrument.solve.engine.ctx->options.warm_start = 1;
     CHECK_OK(eits_set_options(mirror.ctx, &options));
+    CHECK_OK(eits_fast_init(mirror.tracker, FAKE_WORKSPACE, mirror.ctx, &mirror.fast));
     if (untouched > 1)
         CHECK_OK(eits_reference_begin(mirror.ctx, untouched));
 }
@@ -59,13 +62,21 @@ static void mirror_image(const host_packet *packet)
 static void mirror_touches(const host_packet *packet)
 {
     const eits_packet_solved *head = (const eits_packet_solved *)(const void *)packet->payload;
-    eits_touch *touches = mirror.found;
+    eits_touch *touches = mirror.found, found[EITS_MAX_TOUCHES];
     uint32_t count = 0;
     if (mirror.ctx->info.stop != EITS_STOP_BELOW_THRESHOLD || head->status == 0)
-        CHECK_OK(eits_find_touches(mirror.ctx, touches, EITS_MAX_TOUCHES, &count));
+        CHECK_OK(eits_find_touches(mirror.ctx, found, EITS_MAX_TOUCHES, &count));
     ++mirror.touches;
+    const uint32_t all = count;
+    if (head->status == 0)
+        CHECK_OK(eits_fast_report(mirror.fast, found, all, touches, &count));
+    uint32_t drawn = 0;
+    for (uint32_t k = 0; k < count; ++k)
+        drawn += touches[k].explained > 0;
+    const uint8_t shown =
+        drawn < all ? EITS_SHOWN_SOLVER : (uint8_t)eits_get_info(mirror.ctx)->shown;
     mirror.different +=
-        head->count != count || head->shown != (uint8_t)mirror.ctx->info.shown ||
+        head->count != count || head->shown != shown ||
         packet->size != sizeof *head + count * sizeof(eits_packet_touch) ||
         !same_bits(packet->payload + sizeof *head, touches, count * sizeof(eits_packet_touch));
     mirror.found_count = count;
@@ -112,6 +123,7 @@ static void mirror_catch_up(void)
             if (mirror.ctx->reference.wanted > 0)
                 CHECK_OK(eits_reference_finish(mirror.ctx));
             eits_forget(mirror.ctx);
+            eits_fast_forget_all(mirror.fast);
             CHECK_OK(eits_gestures_init(&mirror.gestures, NULL));
         } else if (packet->type == EITS_PACKET_IMAGE) {
             mirror_image(packet);

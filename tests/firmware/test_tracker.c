@@ -160,6 +160,15 @@ TEST(test_beginning_again)
     CHECK(!tracker->running && b.host.instrument.acquire.scan.drive_done == NULL);
 }
 
+/* Align the frame once more. */
+static void align(fw_frame *frame)
+{
+    fw_instrument *instrument = &b.host.instrument;
+    instrument->solve.tracker.owed = true;
+    instrument->solve.tracker.owed_frame = frame->number;
+    (void)fw_tracks_align(&instrument->link, frame);
+}
+
 /* A touch that only frames find is tracked once two of them have found it. A frame that is aligned
  * and not solved does not count. */
 TEST(test_a_place_that_frames_find)
@@ -169,6 +178,7 @@ TEST(test_a_place_that_frames_find)
     host_run(&b.host, 3 * SCAN_MS);
     fw_instrument *instrument = &b.host.instrument;
     fw_frame *frame = &instrument->solve.engine.frames[0];
+    align(frame);
     for (uint32_t round = 0; round < 2; ++round) {
         eits_info info = *eits_get_info(instrument->solve.engine.ctx);
         eits_fast_touch touches[EITS_FAST_TOUCHES];
@@ -176,13 +186,10 @@ TEST(test_a_place_that_frames_find)
         eits_touch found[EITS_MAX_TOUCHES] = {
             {.id = 3, .x_mm = -2, .y_mm = 1, .strength_s_per_m_mm2 = 4, .explained = 0.5f}};
         /* the second frame with it reports it */
-        CHECK_EQUAL(fw_tracker_note(&instrument->solve, found, 1, &info), round);
-        CHECK(round == 0 || found[0].id == EITS_FAST_FRAME_IDS + 3);
-        for (uint32_t unsolved = 0; unsolved < 3 - 2 * round; ++unsolved) {
-            instrument->solve.tracker.owed = true;
-            instrument->solve.tracker.owed_frame = frame->number;
-            (void)fw_tracks_align(&instrument->link, frame);
-        }
+        CHECK_EQUAL(fw_tracker_note(&instrument->solve, true, found, 1, &info), round);
+        CHECK(round == 0 || found[0].id == EITS_FAST_FRAME_IDS + 1);
+        for (uint32_t unsolved = 0; unsolved < 3 - 2 * round; ++unsolved)
+            align(frame);
         CHECK_OK(
             eits_fast_touches(instrument->solve.engine.fast, touches, EITS_FAST_TOUCHES, &count));
         CHECK_EQUAL(count, round);
@@ -209,39 +216,52 @@ TEST(test_frames_alone)
     eits_packet_solved head;
     memcpy(&head, last->payload, sizeof head);
     CHECK(head.count >= 1);
-    uint32_t known = 0;
+    eits_fast_touch followed[EITS_FAST_TOUCHES];
+    uint32_t known = 0, count = 0;
+    CHECK_OK(eits_fast_touches(b.host.instrument.solve.engine.fast, followed, EITS_FAST_TOUCHES,
+                               &count));
     for (uint32_t k = 0; k < head.count; ++k) {
         eits_packet_touch one;
         memcpy(&one, last->payload + sizeof head + k * sizeof one, sizeof one);
-        known += one.id == b.host.instrument.solve.tracker.followed[0].id;
+        known += one.id == followed[0].id;
     }
     CHECK_EQUAL(known, 1);
 }
 
-/* Touches that drives follow and frames find are one; others are told apart by their ids. */
-TEST(test_report)
+/* A model without fields, and one of whose frames every second is streamed: touches come from
+ * frames, at first unconfirmed, and keep their ids, which a tare ends. */
+TEST(test_frames_without_drives)
 {
-    const eits_fast_touch tracked[] = {
-        {.id = 4, .x_mm = 10, .strength_s_per_m_mm2 = 3, .radius_mm = 9, .x_variance_mm2 = 2},
-        {.id = 5, .x_mm = -40, .strength_s_per_m_mm2 = 8, .confirmed = 1}};
-    const eits_touch found[] = {
-        {.id = 1, .x_mm = 11, .strength_s_per_m_mm2 = 5, .explained = 1, .x_variance_mm2 = 1},
-        {.id = 2, .x_mm = 60, .strength_s_per_m_mm2 = 4, .explained = 1}};
-    eits_touch out[EITS_MAX_TOUCHES];
-    uint32_t count = 0;
-    CHECK_OK(eits_fast_report(tracked, 2, found, 2, NULL, 0, out, &count));
-    CHECK_EQUAL(count, 2); /* the one at 60 waits for a second frame */
-    CHECK(out[0].id == 5 && out[0].confirmed == 1 && out[0].explained == 0);
-    CHECK(out[1].id == 4 && out[1].confirmed == 1 && out[1].x_mm == 11 &&
-          out[1].x_variance_mm2 == 1);
-    CHECK_OK(eits_fast_report(tracked, 2, found, 2, found, 2, out, &count));
-    CHECK_EQUAL(count, 3);
-    CHECK_EQUAL(out[2].id, EITS_FAST_FRAME_IDS + 2);
-    CHECK_OK(eits_fast_report(tracked, 2, NULL, 0, NULL, 0, out, &count));
-    CHECK(count == 2 && out[1].confirmed == 0 && out[1].radius_mm == 9 &&
-          out[1].x_variance_mm2 == 2);
-    CHECK_EQUAL(eits_fast_report(tracked, 7, NULL, 0, NULL, 0, out, &count), EITS_E_ARGUMENT);
-    CHECK_EQUAL(eits_fast_report(tracked, 2, found, 2, NULL, 0, NULL, &count), EITS_E_ARGUMENT);
+    for (uint16_t every = 1; every <= 2; ++every) {
+        set_up(every == 1 ? &SKIN_ADJACENT : &SKIN_WITH_FIELDS);
+        STREAM(EITS_STREAM_TOUCHES, every, 0);
+        host_run(&b.host, 5 * SCAN_MS);
+        uint32_t id = 0;
+        for (int again = 0; again < 2; ++again) {
+            const uint32_t before = id;
+            host_forget(&b.host);
+            touch(-2, 1, 4);
+            host_run(&b.host, 20 * SCAN_MS);
+            uint32_t reports = 0;
+            for (uint32_t k = 0; k < host_count(&b.host, EITS_PACKET_TOUCHES); ++k) {
+                const host_packet *packet = host_packet_of(&b.host, EITS_PACKET_TOUCHES, k);
+                eits_packet_solved head;
+                eits_packet_touch one;
+                memcpy(&head, packet->payload, sizeof head);
+                memcpy(&one, packet->payload + sizeof head, head.count > 0 ? sizeof one : 0);
+                if (head.count == 0)
+                    continue;
+                id = reports == 0 ? one.id : id;
+                CHECK(one.id == id && id > before && one.confirmed == (reports > 0));
+                ++reports;
+            }
+            CHECK(reports > 5);
+            touch(-2, 1, 0.25); /* it lifts */
+            host_run(&b.host, 5 * SCAN_MS);
+            if (again == 0)
+                TARE(8);
+        }
+    }
 }
 
 int main(void)

@@ -298,7 +298,7 @@ static size_t usual(uint8_t type, uint8_t *payload)
               .samples = 4, .settle_us = 2, .check_every = 1);
     case EITS_PACKET_SOLVER:
         USUAL(eits_command_solver, .iterations = 6, .max_touches = 3, .lambda_rel = 0.1f,
-              .diagnostics = EITS_DIAGNOSTICS_ALL, .track = 1);
+              .diagnostics = EITS_DIAGNOSTICS_ALL);
     case EITS_PACKET_MODEL_BEGIN:
         USUAL(eits_command_model_begin, .bytes = (uint32_t)model[1].size, .crc = model[1].crc);
     case EITS_PACKET_MODEL_DATA:

@@ -161,9 +161,9 @@ static void read_frame(twins *t, fuzz_bytes *in)
 
 static void change_option(eits_options *o, uint8_t which, fuzz_bytes *in)
 {
-    uint32_t *whole[] = {&o->iterations,    &o->gap_every,         &o->max_touches,  &o->max_masked,
-                         &o->warm_start,    &o->project_reference, &o->touch_sweeps, &o->mac_limit,
-                         &o->track_confirm, &o->track_hold};
+    uint32_t *whole[] = {&o->iterations,  &o->gap_every,         &o->max_touches,  &o->max_masked,
+                         &o->warm_start,  &o->project_reference, &o->touch_sweeps, &o->mac_limit,
+                         &o->second_pass, &o->touch_seek};
     eits_real *real[] = {&o->lambda_abs,
                          &o->lambda_rel,
                          &o->lambda_noise_factor,
@@ -178,7 +178,7 @@ static void change_option(eits_options *o, uint8_t which, fuzz_bytes *in)
                          &o->touch_change_s_per_m,
                          &o->touch_radius_weight,
                          &o->follow_mm,
-                         &o->track_smooth,
+                         &o->noise_floor_v,
                          &o->regularisation_noise_factor};
     enum { WHOLE = sizeof whole / sizeof whole[0], REAL = sizeof real / sizeof real[0] };
     const uint32_t k = which % (WHOLE + REAL + 2);

@@ -199,11 +199,24 @@ static void tell(const eits_touch *touches, uint32_t count)
     note_events("zones", presses, pressed);
 }
 
+/* Ids are those of one touch each, and places are on the skin or next to it. */
+static void note_reported(const eits_touch *touches, uint32_t count)
+{
+    for (uint32_t k = 0; k < count; ++k) {
+        const eits_real place[2] = {touches[k].x_mm, touches[k].y_mm};
+        MUST(touches[k].id != 0 && eits_is_finite(place[0]) && eits_is_finite(place[1]));
+        for (uint32_t l = 0; l < k; ++l)
+            MUST(touches[l].id != touches[k].id);
+        fuzz_note("reported", &touches[k].id, sizeof touches[k].id);
+        fuzz_note_reals("reported", place, 2);
+    }
+}
+
 static void frame(void)
 {
     eits_real volts[SMALL_ROWS], aligned[SMALL_ROWS];
-    eits_touch found[EITS_MAX_TOUCHES];
-    uint32_t count, state;
+    eits_touch found[EITS_MAX_TOUCHES], reported[EITS_MAX_TOUCHES];
+    uint32_t count, reports, state;
     drives();
     make_frame(volts);
     MUST(eits_fast_align(fast, volts, SMALL_ROWS, aligned, &state) == EITS_OK);
@@ -214,8 +227,11 @@ static void frame(void)
     MUST(eits_find_touches(ctx, found, EITS_MAX_TOUCHES, &count) == EITS_OK);
     MUST(status == EITS_OK || count == 0);
     fuzz_check_touches(ctx, found, count);
+    MUST(eits_fast_report(fast, status == EITS_OK ? found : NULL, count, reported, &reports) ==
+         EITS_OK);
+    note_reported(reported, reports);
     MUST(eits_fast_confirm(fast, found, count) == EITS_OK);
-    tell(found, count);
+    tell(reported, reports);
 }
 
 /* ---- the script ---- */
@@ -233,9 +249,6 @@ static void set_options(uint8_t how, uint8_t more)
     o.second_pass = (how & 0x40) != 0;
     o.project_reference = (how & 0x80) != 0;
     o.row_gains = more & 1;
-    o.track_confirm = more / 2u % 3;
-    o.track_hold = more / 8u % 4;
-    o.track_smooth = more & 0x20 ? R(0.5) : 0;
     o.reference_frames = more & 0x40 ? 4 : 0;
     o.test_columns = more & 0x80 ? 100 : 0;
     o.diagnostics = EITS_DIAGNOSTICS_ALL;

@@ -32,7 +32,7 @@ def assert_the_bits_of_the_host(
     ways = [
         usual,
         replace(usual, solver="active-set", sign="both", second_pass=True),
-        replace(usual, solver="working-set", warm_start=True, track_confirm=2, track_hold=3),
+        replace(usual, solver="working-set", warm_start=True),
     ]
     steps: list[Step] = []
     expected = []

@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-/* One frame's result. Every touch of a batch has an id of its own, since none is tracked. */
+/* One frame's result. Ids number its touches, since none is followed. */
 typedef struct eits_result {
     /* of eits_reconstruct; if it is not EITS_OK, there are no touches and the image is zero */
     eits_status status;

@@ -186,7 +186,7 @@ typedef struct eits_touch {
      * one expected of touches of this strength, and the change of conductivity, the strength over
      * the area, is not known either */
     eits_real radius_sd_mm;
-    /* 1: a whole frame has shown it; 0: only drives have (fast.h) */
+    /* 0: drives alone have shown it, or the first frame of frames alone (eits_fast_report) */
     uint32_t confirmed;
 } eits_touch;
 

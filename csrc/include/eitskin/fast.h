@@ -1,4 +1,4 @@
-/* eitskin: touches after each drive of a scan, before the frame is whole.
+/* eitskin: touches in time, with ids: after each drive of a scan, and of whole frames.
  *
  * A frame's rows are measured drive after drive over some 20 ms. After each drive its rows are
  * compared with the values that the known touches predict. A difference is a change of those
@@ -13,15 +13,22 @@
  *     if (state & EITS_FAST_TRUSTED) {
  *         eits_reconstruct(ctx, frame, n_rows, NULL, NULL);
  *         eits_find_touches(ctx, found, EITS_MAX_TOUCHES, &n);
- *         eits_fast_confirm(fast, found, n);
+ *         eits_fast_report(fast, found, n, touches, &count);   // the frame's touches
+ *         eits_fast_confirm(fast, found, n);                   // before the next align
  *         eits_fast_name(fast, &info);                         // a copy of the context's
+ *     } else {
+ *         eits_fast_report(fast, NULL, 0, touches, &count);
  *     }
+ *
+ * Frames whose drives are not known (half scans, no times of rows, models without fields) take
+ * eits_reconstruct, eits_find_touches and eits_fast_report alone.
  *
  * studies/results/fast-path.md describes its numbers and their errors. */
 #ifndef EITSKIN_FAST_H
 #define EITSKIN_FAST_H
 
 #include "eitskin/context.h"
+#include "eitskin/touch.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -42,7 +49,8 @@ typedef struct eits_fast_touch {
     eits_real x_variance_mm2, xy_covariance_mm2, y_variance_mm2; /* of its place */
 } eits_fast_touch;
 
-/* Ids of touches that whole frames alone show are greater than this. */
+/* Once drives have come, ids of touches that whole frames alone show are greater than this: ids of
+ * drives have 16 bits in a packet. */
 #define EITS_FAST_FRAME_IDS 65536u
 
 /* Bits that eits_fast_align sets for a frame. */
@@ -74,12 +82,15 @@ typedef struct eits_fast eits_fast;
 #define EITS_FAST_FIT_NUMBERS ((2u + 3u) * EITS_FAST_WAITING * 22u + 3u * 30u)
 
 /* Bytes of the state without its arrays: states, covariance and fits; 28 numbers and 5 per touch
- * beside these; counts and flags; pointers. csrc/src/fast/fast.h asserts that it fits. */
+ * beside these; touches of frames, with 7 numbers and 4 counts each; counts and flags; pointers.
+ * csrc/src/fast/fast.h asserts that it fits. */
 #define EITS_FAST_STATE                                                                      \
     EITS_ALIGN16((EITS_FAST_STATES * (EITS_FAST_STATES + 1u) + EITS_FAST_FIT_NUMBERS + 28u + \
                   5u * EITS_FAST_TOUCHES) *                                                  \
                      sizeof(eits_real) +                                                     \
-                 EITS_MAX_ELECTRODES + 112u * sizeof(uint32_t) + 40u * sizeof(void *))
+                 EITS_MAX_TOUCHES * (sizeof(eits_touch) + 7u * sizeof(eits_real) + 16u) +    \
+                 EITS_FAST_TOUCHES * sizeof(eits_fast_touch) + EITS_MAX_ELECTRODES +         \
+                 116u * sizeof(uint32_t) + 40u * sizeof(void *))
 
 /* Bytes that are kept per drive: the place of its rows, and which touches were there, with their
  * places and strengths. */
@@ -129,8 +140,8 @@ typedef struct eits_fast eits_fast;
          EITS_FAST_ARRAYS(EITS_ADD_BYTES, n_rows, drive_rows, nx, ny) + \
      EITS_FAST_WAITING * (0u EITS_FAST_WAITING_ARRAYS(EITS_ADD_BYTES, drive_rows)))
 
-/* Returns the same number for an open model; 0 if it has no fields (section FLDS), or if a drive
- * has more than EITS_FAST_ROWS rows. */
+/* Returns the same number for an open model. One without fields (section FLDS), or with a drive of
+ * more than EITS_FAST_ROWS rows, counts as having no drives: its touches come from frames alone. */
 size_t eits_fast_size(const eits_model *model);
 
 /* Lay the state out in `memory` (16-byte aligned), beside a context of the same model, which must
@@ -138,12 +149,13 @@ size_t eits_fast_size(const eits_model *model);
  * Errors: EITS_E_ARGUMENT, EITS_E_WORKSPACE. */
 eits_status eits_fast_init(void *memory, size_t size, const eits_context *ctx, eits_fast **fast);
 
-/* Begin without touches, with the reference that the context has now. Errors: EITS_E_ARGUMENT;
- * EITS_E_NO_REFERENCE if it has none, or one without noise. */
+/* Begin without touches of drives, with the reference that the context has now. Errors:
+ * EITS_E_ARGUMENT; EITS_E_NO_REFERENCE if it has none, or one without noise. */
 eits_status eits_fast_begin(eits_fast *fast);
 
-/* Returns the number of drives of the protocol, in the order of their first rows; and the rows of
- * one drive, ascending, or NULL if there is no such drive. */
+/* Returns the number of drives that can be taken, in the order of their first rows: all of the
+ * protocol's, or 0 (eits_fast_size); and the rows of one drive, ascending, or NULL if there is no
+ * such drive. */
 uint32_t eits_fast_drives(const eits_fast *fast);
 const uint16_t *eits_fast_rows(const eits_fast *fast, uint32_t drive, uint32_t *count);
 
@@ -178,14 +190,26 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
  * EITS_E_ARGUMENT. */
 eits_status eits_fast_name(eits_fast *fast, eits_info *info);
 
+/* Forget all touches, those of frames too; ids count on. Drives are refused until the next
+ * eits_fast_begin. NULL is allowed. */
+void eits_fast_forget_all(eits_fast *fast);
+
 /* Write a frame's touches, the strongest first, into `touches`, which has room for
- * EITS_MAX_TOUCHES: those of eits_fast_touches after the frame was aligned, `tracked`, with what
- * the solver `found` of them in that frame. A touch that it found and drives do not follow is
- * reported if the solver also found it in the frame `before`; its id is then greater than
- * EITS_FAST_FRAME_IDS. Where the frame was not solved, n_found is 0. Errors: EITS_E_ARGUMENT. */
-eits_status eits_fast_report(const eits_fast_touch *tracked, uint32_t n_tracked,
-                             const eits_touch *found, uint32_t n_found, const eits_touch *before,
-                             uint32_t n_before, eits_touch *touches, uint32_t *count);
+ * EITS_MAX_TOUCHES. Call it once per frame, with what the solver `found` in it; NULL, with n_found
+ * 0, if the frame was not solved.
+ *
+ * After eits_fast_align these are the touches that drives followed then, each with what the solver
+ * found of it. A touch that it found and drives do not follow is reported from its second frame on;
+ * its id is greater than EITS_FAST_FRAME_IDS.
+ *
+ * A frame that was not aligned has the touches that were found in it. A clear touch is reported at
+ * once, and is `confirmed` by the second frame; one that explains less than 5 % of the frame, or is
+ * less than 1.5 times as clear as noise, is reported from its second frame on. A touch keeps its id
+ * if it is found again within options.follow_mm of where its velocity brings it, in one of three
+ * frames. Meanwhile it is reported, with `explained` and `confidence` 0, only if it was fainter
+ * than noise and had been found in four frames. Errors: EITS_E_ARGUMENT. */
+eits_status eits_fast_report(eits_fast *fast, const eits_touch *found, uint32_t n_found,
+                             eits_touch *touches, uint32_t *count);
 
 #ifdef __cplusplus
 }

@@ -15,8 +15,7 @@
 extern "C" {
 #endif
 
-#define EITS_MAX_TOUCHES      16
-#define EITS_MAX_TRACK_FRAMES 1000u
+#define EITS_MAX_TOUCHES 16
 
 /* The sign of the conductivity changes that the image may have. */
 typedef enum eits_sign {
@@ -110,7 +109,8 @@ typedef struct eits_options {
     eits_real touch_radius_weight;
     /* sweeps of the off-grid fit over all touches; 0: peaks with their strengths only */
     uint32_t touch_sweeps;
-    /* a touch keeps its id if it moved by at most this distance since the last frame */
+    /* how far from where its velocity brings it a touch may be found in the next frame and keep its
+     * id */
     eits_real follow_mm;
     /* > 0: stop with the best so far before info.macs goes beyond this (solve.h) */
     uint32_t mac_limit;
@@ -126,14 +126,6 @@ typedef struct eits_options {
      * interaction taken out of the data; image and info are then those of the second solve. Ignored
      * with a mac_limit */
     uint32_t second_pass;
-    /* a touch is reported after it was found in this many consecutive frames; 0, 1: at once */
-    uint32_t track_confirm;
-    /* a touch that is not found keeps its id for this many frames; it is still reported if it was
-     * faint before */
-    uint32_t track_hold;
-    /* > 0: smooth places, radii and strengths in time; the value is the uncertainty, in pixels, of
-     * the place of a touch whose S'y equals that of noise */
-    eits_real track_smooth;
     /* the whitening's regularisation is at least this times noise_v / v0_rms, if both are known; 0:
      * it is the model's */
     eits_real regularisation_noise_factor;
@@ -172,10 +164,9 @@ const eits_option *eits_option_table(uint32_t *count);
 /* The model's default options. Errors: EITS_E_ARGUMENT. */
 eits_status eits_options_default(const eits_model *model, eits_options *options);
 
-/* Change `options` for a stream of 48 or 96 frames per second (docs/guide/tracking.md). The
- * detection threshold is lowered by a quarter, and touches are tracked in time, so that touches
- * from noise are not reported. Not for single frames: a faint touch is reported only if the frames
- * before show it too. Errors: EITS_E_ARGUMENT. */
+/* Change `options` for a stream of frames whose touches eits_fast_report follows
+ * (docs/guide/tracking.md): the detection threshold is lowered by a quarter, since touches from
+ * noise are not found in a second frame. Errors: EITS_E_ARGUMENT. */
 eits_status eits_options_track(eits_options *options);
 
 #ifdef __cplusplus

@@ -662,8 +662,6 @@ typedef struct eits_command_solver {
     uint32_t mac_limit;
     /* bits of eits_diagnostic that are looked for */
     uint32_t diagnostics;
-    /* 1: touches are followed in time (eits_options_track), as after a start; 0: they are not */
-    uint32_t track;
 } eits_command_solver;
 
 /* Announces a model. */

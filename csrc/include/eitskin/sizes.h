@@ -175,11 +175,6 @@ extern "C" {
     (14u * sizeof(void *) EITS_WORKSPACE_ARRAYS(EITS_ADD_POINTER, , , , , , ) \
                EITS_PREPARED_ARRAYS(EITS_ADD_POINTER, , ))
 
-/* A touch that is followed: the touch, five numbers for its speed and covariance, and three counts,
- * which in double width end at a multiple of eight bytes. */
-#define EITS_FOLLOWED_SIZE \
-    (sizeof(eits_touch) + 5u * sizeof(eits_real) + (sizeof(eits_real) == 8u ? 16u : 12u))
-
 /* Single numbers of the parts: 23 reals of reference and whitening, the shift of places by terms
  * along x and y; 35 counts and flags; and 13 parts, each of which ends at a multiple of eight
  * bytes. */
@@ -195,9 +190,9 @@ extern "C" {
 
 /* Bytes of the context, at the workspace's start. csrc/src/api/setup.c asserts that it fits, and
  * that little is left over. */
-#define EITS_CONTEXT_SIZE                                                         \
-    EITS_ALIGN16(sizeof(eits_options) + sizeof(eits_info) + EITS_MAX_ELECTRODES + \
-                 EITS_MAX_TOUCHES * EITS_FOLLOWED_SIZE + EITS_CONTEXT_POINTERS +  \
+#define EITS_CONTEXT_SIZE                                                            \
+    EITS_ALIGN16(sizeof(eits_options) + sizeof(eits_info) + EITS_MAX_ELECTRODES +    \
+                 2u * EITS_MAX_TOUCHES * sizeof(eits_real) + EITS_CONTEXT_POINTERS + \
                  EITS_CONTEXT_NUMBERS + EITS_JOINT_NUMBERS)
 
 /* Bytes of a workspace; n_cells is nx * ny; n_electrodes is 0 for a model without fields (section

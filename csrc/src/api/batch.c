@@ -22,7 +22,7 @@ eits_status eits_reconstruct_batch(eits_context *ctx, const eits_real *frames, s
         eits_result *result = results + k;
         memset(result, 0, sizeof *result);
         /* The frames have nothing to do with each other: the solver must not start from the last
-         * image, and touches must not take over its ids. */
+         * image. */
         eits_forget(ctx);
         result->status = eits_reconstruct(ctx, frames + k * length, length, NULL, NULL);
         if (result->status == EITS_OK && touches != NULL)

@@ -13,11 +13,9 @@
  * in it.
  *
  * The struct has only data that cannot be computed again from the model and a frame; the basis is
- * built again, which costs MACs once. Tracked touches are not saved: they have moved by the time of
- * the restore. */
+ * built again, which costs MACs once. */
 typedef struct saved {
     eits_options options;
-    uint32_t next_id;
     uint32_t count, ready, outliers;
     eits_real v0_rms, gain, correlation, noise_v, lambda_noise;
 } saved;
@@ -43,9 +41,8 @@ eits_status eits_save(const eits_context *ctx, void *memory, size_t size)
         return EITS_E_WORKSPACE;
     const eits_reference *r = &ctx->reference;
     const size_t rows = ctx->model->n_rows;
-    const saved head = {
-        ctx->options, ctx->tracker.next_id, r->count,   r->ready,       r->outliers, r->v0_rms,
-        r->gain,      r->correlation,       r->noise_v, r->lambda_noise};
+    const saved head = {ctx->options, r->count,       r->ready,   r->outliers,    r->v0_rms,
+                        r->gain,      r->correlation, r->noise_v, r->lambda_noise};
     uint8_t *to = memory;
     memcpy(to, &head, sizeof head);
     to += EITS_ALIGN16(sizeof head);
@@ -68,7 +65,6 @@ eits_status eits_restore(eits_context *ctx, const void *memory, size_t size)
     memcpy(&head, from, sizeof head);
     from += EITS_ALIGN16(sizeof head);
     ctx->options = head.options;
-    ctx->tracker.next_id = head.next_id;
     /* The deviations m2 belong to a tare under way. None is under way here, so they are not saved.
      */
     *r = (eits_reference){.v0 = r->v0,
@@ -84,8 +80,7 @@ eits_status eits_restore(eits_context *ctx, const void *memory, size_t size)
                           .lambda_noise = head.lambda_noise};
     memcpy(r->v0, from, rows * sizeof r->v0[0]);
     memcpy(ctx->rows.masked, from + EITS_REALS(rows), rows);
-    /* Row gains follow from v0 and the model, as at the tare. Touches of the time before would be
-     * other fingers. */
+    /* Row gains follow from v0 and the model, as at the tare. */
     eits_learn_row_gains(ctx);
     eits_forget(ctx);
     return EITS_OK;

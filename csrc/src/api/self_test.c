@@ -75,7 +75,6 @@ static uint32_t begin_trial(eits_context *ctx, const trial *t)
     options.solver = t->solver;
     options.sign = t->sign;
     options.gap_rel = t->gap_rel;
-    options.track_smooth = R(0.5);
     options.second_pass = t->learned;
     options.noise_floor_v = R(0x1p-10) * ctx->reference.v0_rms;
     const int32_t status[2] = {eits_set_options(ctx, &options), learn(ctx, t)};

@@ -104,8 +104,7 @@ eits_status eits_init(void *workspace, size_t size, const eits_model *model, eit
                            .columns.s = &model->sensitivity,
                            .columns.room = (uint32_t)EITS_CACHED(model->n_pixels),
                            .projection.stale = 1,
-                           .whitening.noise_ratio = 1,
-                           .tracker.next_id = 1};
+                           .whitening.noise_ratio = 1};
     lay_out(made, &next);
     lend(made);
     map_cells(model, made->cell);
@@ -167,8 +166,6 @@ void eits_forget(eits_context *ctx)
 {
     if (ctx == NULL)
         return;
-    /* ids go on counting: an id that a host has seen never names another finger */
     ctx->solver.warm = 0;
-    ctx->tracker.count = 0;
     eits_reference_tracking_break(ctx);
 }

@@ -1,10 +1,8 @@
-/* Find touches in the image: they are fitted, pruned and tracked, and their force is computed; a
+/* Find touches in the image: they are fitted, pruned and tested, and their force is computed; a
  * second pass may follow.
  *
- * The order matters. Crowding is checked on this frame's touches, before tracking hides tentative
- * touches and adds held ones. Force is computed after tracking, from the smoothed strength and
- * place. The second pass solves the image again for data without the touches' interaction; the
- * touches stay those of the first pass, so that the two do not iterate. */
+ * The order matters. The second pass solves the image again for data without the touches'
+ * interaction; the touches stay those of the first pass, so that the two do not iterate. */
 #include "eitskin/force.h"
 #include "eitskin/touch.h"
 
@@ -83,17 +81,15 @@ static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fi
         eits_fit_jointly(ctx, f, &j);
 }
 
-/* Which image shows the frame: the touches' if they explain it and all of them are reported. Where
- * tracking still hides a touch that was found, the touches' image would lack it. */
-static eits_shown shown(const eits_context *ctx, const eits_fit *f, uint32_t found,
-                        const eits_touch *reported, uint32_t count)
+/* Which image shows the frame: the touches' if they explain it. */
+static eits_shown shown(const eits_context *ctx, const eits_fit *f, const eits_touch *found,
+                        uint32_t count)
 {
     const eits_real most = eits_can_fit_jointly(ctx) ? EITS_SHOWN_UNEXPLAINED : EITS_SHOWN_UNTESTED;
-    uint32_t drawn = 0;
+    int drawn = count > 0;
     for (uint32_t k = 0; k < count; ++k)
-        drawn += reported[k].explained > 0;
-    return drawn > 0 && drawn == found && f->beyond_noise < most ? EITS_SHOWN_TOUCHES
-                                                                 : EITS_SHOWN_SOLVER;
+        drawn &= found[k].explained > 0; /* others are not drawn */
+    return drawn && f->beyond_noise < most ? EITS_SHOWN_TOUCHES : EITS_SHOWN_SOLVER;
 }
 
 eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t room,
@@ -104,8 +100,7 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     const eits_scratch *scratch = &ctx->scratch;
     eits_fit f = eits_fit_none(ctx, scratch);
     eits_touch found[EITS_MAX_TOUCHES];
-    /* An image that is zero for the reason given by info.stop has no touches. Tracked touches are
-     * then held or dropped like any that are not found. */
+    /* An image that is zero for the reason given by info.stop has no touches. */
     ctx->info.unexplained = 0;
     eits_check_crowd(ctx, found, 0); /* CROWDED only of this frame's touches */
     if (may_have_touches(ctx)) {
@@ -115,8 +110,8 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
             eits_check_crowd(ctx, found, 0);
         }
     }
-    const uint32_t finite = eits_report_touches(ctx, &f, found);
-    for (uint32_t k = 0; f.tested && k < finite; ++k) {
+    const uint32_t reported = eits_report_touches(ctx, &f, found);
+    for (uint32_t k = 0; f.tested && k < reported; ++k) {
         eits_real at[2] = {found[k].x_mm, found[k].y_mm};
         eits_place_on_skin(ctx, at);
         found[k].x_mm = at[0];
@@ -124,16 +119,11 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
     }
     ctx->info.touch_macs = f.macs;
     eits_check_count(ctx, &f);
-    /* The checks above use this frame's touches; tracking may hide some of them and add others. */
-    const uint32_t next_id = ctx->tracker.next_id;
-    const uint32_t reported = eits_track(ctx, found, finite);
-    if (ctx->tracker.next_id != next_id) /* a track started, so these may be other touches even if
-                                            their number is the same */
-        eits_reference_tracking_break(ctx);
     ctx->info.touches = reported;
-    ctx->info.shown = shown(ctx, &f, finite, found, reported);
+    ctx->info.shown = shown(ctx, &f, found, reported);
     for (uint32_t k = 0; k < reported; ++k) {
         eits_bring_onto_skin(ctx, &found[k].x_mm, &found[k].y_mm);
+        found[k].id = k + 1;
         found[k].confirmed = 1;
         found[k].force_n =
             eits_force_n(ctx->model, found[k].x_mm, found[k].y_mm, found[k].strength_s_per_m_mm2);
@@ -146,12 +136,10 @@ eits_status eits_find_touches(eits_context *ctx, eits_touch *touches, uint32_t r
         touches[k] = found[k];
     if (count != NULL)
         *count = reported;
-    const uint32_t followed = (ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) != 0
-                                  ? EITS_TOUCHES_UNKNOWN
-                                  : ctx->tracker.count;
+    const int known = (ctx->info.diagnostics & EITS_DIAGNOSTIC_MODEL_MISMATCH) == 0;
     /* If the reference moved, the coefficients belong to another reference and are not a valid
      * start. */
-    if (eits_reference_tracking_end(ctx, scratch, found, reported, followed, &ctx->info.touch_macs))
+    if (eits_reference_tracking_end(ctx, scratch, found, reported, known, &ctx->info.touch_macs))
         ctx->solver.warm = 0;
     return EITS_OK;
 }

@@ -20,12 +20,13 @@ enum { EITS_SCRATCH_ROWS = 8, EITS_SCRATCH_PIXELS = 3 };
 typedef struct eits_reference_tracking {
     uint32_t seen;    /* frames since the reference was taken */
     uint32_t touches; /* touches in the last frame; EITS_TOUCHES_UNKNOWN: it cannot be used */
-    uint32_t rest;    /* frames with as many touches that must pass before a mean begins */
-    uint32_t frames;  /* consecutive frames whose differences are summed in the reference's m2 */
-    uint32_t open;    /* 1: the last frame's difference is summed, its touches are not known yet */
-    uint32_t means;   /* means since the number of touches changed */
-    eits_real gain;   /* with touches: the frame's size over the reference's in the first mean */
-    eits_real level;  /* max(S'y) of the untouched skin in the first mean; 0: not known */
+    eits_real at[EITS_MAX_TOUCHES][2]; /* and their places, mm */
+    uint32_t rest;   /* frames with as many touches that must pass before a mean begins */
+    uint32_t frames; /* consecutive frames whose differences are summed in the reference's m2 */
+    uint32_t open;   /* 1: the last frame's difference is summed, its touches are not known yet */
+    uint32_t means;  /* means since the number of touches changed */
+    eits_real gain;  /* with touches: the frame's size over the reference's in the first mean */
+    eits_real level; /* max(S'y) of the untouched skin in the first mean; 0: not known */
 } eits_reference_tracking;
 #define EITS_TOUCHES_UNKNOWN UINT32_MAX
 
@@ -231,24 +232,6 @@ typedef struct eits_joint_memory {
     eits_real gradient[EITS_JOINT_PARAMETERS];
 } eits_joint_memory;
 
-/* A touch that is followed (touch/disc.h). */
-typedef struct eits_followed {
-    eits_touch touch;       /* as reported; id 0: not yet */
-    eits_real vx_mm, vy_mm; /* a frame */
-    /* covariance of place and velocity, along either axis */
-    eits_real place_mm2, both_mm2, speed_mm2;
-    uint32_t seen;   /* frames in which it was found, counted up to a limit (touch/tracker.c) */
-    uint32_t missed; /* consecutive frames in which it was not */
-    uint32_t faint;  /* 1: its own S'y was below that of noise when it was last found */
-} eits_followed;
-
-/* Written by touch/tracker. */
-typedef struct eits_tracker {
-    eits_followed followed[EITS_MAX_TOUCHES];
-    uint32_t count;
-    uint32_t next_id;
-} eits_tracker;
-
 /* Memory that no module owns. Each stage may use all of it, and hands it down to the functions that
  * it calls; they leave it with undefined content. A function that keeps something in it across such
  * a call says in its comment, or by the names of its variables, what it keeps where. While a solver
@@ -279,7 +262,6 @@ struct eits_context {
     eits_evidence evidence;
     eits_multipole multipole;
     eits_joint_memory joint;
-    eits_tracker tracker;
     eits_scratch scratch;
 };
 

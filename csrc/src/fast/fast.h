@@ -38,6 +38,18 @@ typedef struct fast_known {
     eits_real peak;   /* its greatest strength */
 } fast_known;
 
+/* A touch that frames show and no drive follows (report.c). */
+typedef struct fast_seen {
+    eits_touch touch;          /* as it was last found */
+    eits_real at[2], speed[2]; /* mm; mm in a frame */
+    /* covariance of place and velocity, along either axis */
+    eits_real place_mm2, both_mm2, speed_mm2;
+    uint32_t id;     /* 0: not reported yet */
+    uint32_t seen;   /* frames that showed it, counted up to EITS_FAST_SEEN_KNOWN */
+    uint32_t missed; /* consecutive frames that did not */
+    uint32_t faint;  /* 1: it was fainter than noise when it was last found */
+} fast_seen;
+
 /* What one drive says of touches at places: how it is explained, and how to move them. */
 typedef struct fast_share {
     eits_real strength[2], variance[2];
@@ -93,6 +105,13 @@ struct eits_fast {
     uint32_t named, named_before;         /* diagnostics of the last two solved frames */
     uint32_t wild;                        /* rows since the last frame */
     uint8_t suspect[EITS_MAX_ELECTRODES]; /* wild rows of each electrode, less those that are not */
+    /* touches of frames; and those that drives followed when one was last aligned */
+    uint32_t n_seen, seen_ids;
+    uint32_t driven;  /* drives have come: ids of `seen` are then above EITS_FAST_FRAME_IDS */
+    uint32_t aligned; /* a frame that is not reported yet */
+    uint32_t n_followed;
+    fast_seen seen[EITS_MAX_TOUCHES];
+    eits_fast_touch followed[EITS_FAST_MAX_TOUCHES];
     /* tracks */
     uint32_t count;
     fast_known known[EITS_FAST_MAX_TOUCHES];

@@ -115,7 +115,8 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     *state = explained ? (uint32_t)EITS_FAST_EXPLAINED : 0u;
     if (explained || fast->unexplained_frames > EITS_FAST_FRAMES)
         *state |= (uint32_t)EITS_FAST_TRUSTED;
-    return EITS_OK;
+    fast->aligned = 1;
+    return eits_fast_touches(fast, fast->followed, EITS_FAST_MAX_TOUCHES, &fast->n_followed);
 }
 
 uint32_t eits_fast_nearest(const eits_real *place, const eits_real (*found)[2],

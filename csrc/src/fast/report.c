@@ -1,27 +1,236 @@
-/* A frame's touches: those that drives follow, with what the whole-frame solver finds of them. */
+/* A frame's touches: those that drives follow, with what the whole-frame solver found of them, and
+ * those that frames alone show, which are followed from frame to frame.
+ *
+ * Such a touch goes on by its velocity for one frame, and is what is found nearest to there. The
+ * filter is Kalman's (Trans. ASME, J. Basic Eng. 82 (1960) 35-45) for a place of constant velocity,
+ * with the same variances along both axes, so that no matrix is inverted:
+ *
+ *     predict   p += v,  P += 2 C + V + q / 4,  C += V + q / 2,  V += q
+ *     update    K = P / (P + R),  p += K (found - p),  v += C / (P + R) (found - p)
+ *
+ * with P, C, V place_mm2, both_mm2, speed_mm2, q the square of the velocity's change in a frame and
+ * R the variance of a found place. Time is counted in frames, since frames may come without times;
+ * limits and variances are in follow_mm, which the caller sets for the frame rate. The filter only
+ * decides which touch is which: what is reported lies where the solver found it. */
 #include "fast/fast.h"
 
-/* The places of touches, mm. */
-static void places_of(const eits_touch *touches, uint32_t count, eits_real (*at)[2])
+#include "eitskin/force.h"
+
+enum { NONE = EITS_MAX_TOUCHES };
+
+/* ---- touches that frames alone show ---- */
+
+/* lambda_max of a frame that had this touch alone, about: the frame's by its fraction of the
+ * energy. */
+static eits_real own_lambda(const eits_fast *fast, const eits_touch *touch)
 {
-    for (uint32_t n = 0; n < count; ++n) {
-        at[n][0] = touches[n].x_mm;
-        at[n][1] = touches[n].y_mm;
+    return fast->ctx->info.lambda_max * eits_sqrt(touch->explained);
+}
+
+/* The variance of a found place, mm^2: the weaker a touch over the noise, the less certain is the
+ * centre of its peak. */
+static eits_real place_variance(const eits_fast *fast, const eits_touch *found)
+{
+    const eits_real pixel = (eits_real)fast->model->pixel_mm, own = own_lambda(fast, found);
+    const eits_real noise = own > 0 ? fast->ctx->info.lambda_noise / own : 0;
+    return fast_square(pixel) *
+           (fast_square(EITS_FAST_SEEN_NOISE * noise) + fast_square(EITS_FAST_SEEN_DEVIATION));
+}
+
+/* A new touch has a velocity of unknown size: the place at which it is found next decides. */
+static fast_seen start(const eits_fast *fast, const eits_touch *found)
+{
+    const eits_real speed = EITS_FAST_SEEN_SPEED * fast->ctx->options.follow_mm;
+    return (fast_seen){.touch = *found,
+                       .at = {found->x_mm, found->y_mm},
+                       .place_mm2 = place_variance(fast, found),
+                       .speed_mm2 = fast_square(speed)};
+}
+
+/* One frame later. */
+static void predict(const eits_fast *fast, fast_seen *s)
+{
+    const eits_real change = fast_square(EITS_FAST_SEEN_CHANGE * fast->ctx->options.follow_mm);
+    fast_axpy(s->at, 1, s->speed, 2);
+    s->place_mm2 += 2 * s->both_mm2 + s->speed_mm2 + change / 4;
+    s->both_mm2 += s->speed_mm2 + change / 2;
+    s->speed_mm2 += change;
+}
+
+static int is_finite(const fast_seen *s)
+{
+    const eits_real variance[3] = {s->place_mm2, s->both_mm2, s->speed_mm2};
+    return eits_all_finite(s->at, 2) && eits_all_finite(s->speed, 2) &&
+           eits_all_finite(variance, 3);
+}
+
+/* What is known of a touch, with what was found of it. Where that would be no number, it starts
+ * again. */
+static fast_seen updated(const eits_fast *fast, const fast_seen *before, const eits_touch *found)
+{
+    const fast_seen begun = start(fast, found);
+    fast_seen next = *before;
+    const eits_real total = before->place_mm2 + begun.place_mm2;
+    const eits_real gain = before->place_mm2 / total, speed_gain = before->both_mm2 / total;
+    const eits_real off[2] = {found->x_mm - before->at[0], found->y_mm - before->at[1]};
+    fast_axpy(next.at, gain, off, 2);
+    fast_axpy(next.speed, speed_gain, off, 2);
+    next.place_mm2 -= gain * before->place_mm2;
+    next.both_mm2 -= gain * before->both_mm2;
+    next.speed_mm2 -= speed_gain * before->both_mm2;
+    if (!is_finite(&next))
+        next = begun;
+    next.touch = *found;
+    next.id = before->id;
+    next.seen = before->seen;
+    return next;
+}
+
+/* Nearest pairs first, among those that were reported or among the others: owner[n] is the touch
+ * that `found` n is. */
+static void pair(const eits_fast *fast, const eits_touch *found, uint32_t count, int reported,
+                 uint32_t *owner)
+{
+    uint8_t taken[EITS_MAX_TOUCHES] = {0};
+    const eits_real follow_mm = fast->ctx->options.follow_mm;
+    const eits_real reach = fast_square(reported ? follow_mm : EITS_FAST_SEEN_REACH * follow_mm);
+    for (;;) { /* at most EITS_MAX_TOUCHES pairs */
+        eits_real nearest = reach;
+        uint32_t from = NONE, to = NONE;
+        for (uint32_t n = 0; n < count; ++n) {
+            for (uint32_t l = 0; owner[n] == NONE && l < fast->n_seen; ++l) {
+                const fast_seen *s = &fast->seen[l];
+                const eits_real dx = found[n].x_mm - s->at[0], dy = found[n].y_mm - s->at[1];
+                const eits_real square = dx * dx + dy * dy;
+                if (!taken[l] && (s->id != 0) == reported && square <= nearest) {
+                    nearest = square;
+                    from = l;
+                    to = n;
+                }
+            }
+        }
+        if (to == NONE)
+            return;
+        owner[to] = from;
+        taken[from] = 1;
     }
 }
 
+/* Count one more frame that shows the touch, and give it an id where it may be reported: at once if
+ * it is clear, and no drive could have found it; else with the second frame. In a frame whose
+ * drives are followed, a touch that landed while it was scanned may stand at a wrong place. */
+static void name(eits_fast *fast, fast_seen *s, int drives)
+{
+    const eits_info *info = &fast->ctx->info;
+    const int clear =
+        own_lambda(fast, &s->touch) >= EITS_FAST_SURE_CLEARNESS * info->lambda_noise &&
+        s->touch.explained >= EITS_FAST_SURE_FRACTION;
+    const int sure = !drives && (clear || !(info->lambda_noise > 0));
+    s->missed = 0;
+    s->faint = own_lambda(fast, &s->touch) < info->lambda_noise;
+    s->seen += s->seen < EITS_FAST_SEEN_KNOWN;
+    if (s->id != 0 || (s->seen < 2 && !sure))
+        return;
+    while (s->id == 0) /* after 2^32 touches ids come round */
+        s->id = ++fast->seen_ids + (fast->driven ? EITS_FAST_FRAME_IDS : 0u);
+}
+
+/* Follow the `count` found touches that no drives follow. Those that were found come first, in
+ * their order; then those that may come back, as far as there is room. */
+static void follow(eits_fast *fast, const eits_touch *found, uint32_t count, int drives)
+{
+    uint32_t owner[EITS_MAX_TOUCHES];
+    uint8_t met[EITS_MAX_TOUCHES] = {0};
+    fast_seen next[EITS_MAX_TOUCHES];
+    for (uint32_t l = 0; l < fast->n_seen; ++l)
+        predict(fast, &fast->seen[l]);
+    for (uint32_t n = 0; n < count; ++n)
+        owner[n] = NONE;
+    pair(fast, found, count, 1, owner);
+    pair(fast, found, count, 0, owner);
+    for (uint32_t n = 0; n < count; ++n) {
+        if (owner[n] != NONE)
+            met[owner[n]] = 1;
+        next[n] = owner[n] == NONE ? start(fast, &found[n])
+                                   : updated(fast, &fast->seen[owner[n]], &found[n]);
+        name(fast, &next[n], drives);
+    }
+    for (uint32_t l = 0; l < fast->n_seen && count < EITS_MAX_TOUCHES; ++l) {
+        fast_seen *s = &fast->seen[l];
+        if (met[l] || s->id == 0 || s->missed == EITS_FAST_SEEN_HOLD)
+            continue;
+        ++s->missed;
+        next[count++] = *s;
+    }
+    memcpy(fast->seen, next, count * sizeof next[0]);
+    fast->n_seen = count;
+}
+
+void eits_fast_forget_all(eits_fast *fast)
+{
+    if (fast == NULL)
+        return;
+    fast->n_seen = fast->begun = fast->aligned = 0;
+}
+
+/* ---- the report ---- */
+
 /* A touch that the solver has not found in this frame: what drives know of it. */
-static eits_touch alone(const eits_fast_touch *t)
+static eits_touch alone(const eits_fast *fast, const eits_fast_touch *t)
 {
     return (eits_touch){.id = t->id,
                         .x_mm = t->x_mm,
                         .y_mm = t->y_mm,
                         .radius_mm = t->radius_mm,
                         .strength_s_per_m_mm2 = t->strength_s_per_m_mm2,
+                        .force_n =
+                            eits_force_n(fast->model, t->x_mm, t->y_mm, t->strength_s_per_m_mm2),
                         .x_variance_mm2 = t->x_variance_mm2,
                         .xy_covariance_mm2 = t->xy_covariance_mm2,
                         .y_variance_mm2 = t->y_variance_mm2,
                         .confirmed = t->confirmed};
+}
+
+/* The touches that drives followed when the frame was aligned; returns their number. Those found
+ * that are one of them are taken. */
+static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, uint32_t count,
+                                uint8_t *taken, eits_touch *touches)
+{
+    eits_real at[EITS_MAX_TOUCHES][2];
+    for (uint32_t n = 0; n < count; ++n) {
+        at[n][0] = found[n].x_mm;
+        at[n][1] = found[n].y_mm;
+    }
+    for (uint32_t k = 0; k < fast->n_followed; ++k) {
+        const eits_fast_touch *t = &fast->followed[k];
+        const eits_real place[2] = {t->x_mm, t->y_mm};
+        const uint32_t n = eits_fast_nearest(place, (const eits_real(*)[2])at, taken, count);
+        touches[k] = n < count ? found[n] : alone(fast, t);
+        touches[k].id = t->id;
+        touches[k].confirmed = n < count || t->confirmed;
+        if (n < count)
+            taken[n] = 1;
+    }
+    return fast->n_followed;
+}
+
+/* Add those that frames alone show. One that this frame lacks is reported if it was well known and
+ * fainter than noise when it was last found: a clear touch has lifted. */
+static void report_seen(const eits_fast *fast, int drives, eits_touch *touches, uint32_t *count)
+{
+    for (uint32_t k = 0; k < fast->n_seen && *count < EITS_MAX_TOUCHES; ++k) {
+        const fast_seen *s = &fast->seen[k];
+        const int held = !drives && s->faint && s->seen == EITS_FAST_SEEN_KNOWN &&
+                         *count < fast->ctx->options.max_touches;
+        if (s->id == 0 || (s->missed > 0 && !held))
+            continue;
+        eits_touch *t = &touches[(*count)++];
+        *t = s->touch;
+        t->id = s->id;
+        t->confirmed = s->seen > 1;
+        if (s->missed > 0)
+            t->explained = t->confidence = 0;
+    }
 }
 
 /* Sort by strength, the strongest first; touches of equal strength keep their order. */
@@ -38,44 +247,26 @@ static void sort(eits_touch *touches, uint32_t count)
     }
 }
 
-eits_status eits_fast_report(const eits_fast_touch *tracked, uint32_t n_tracked,
-                             const eits_touch *found, uint32_t n_found, const eits_touch *before,
-                             uint32_t n_before, eits_touch *touches, uint32_t *count)
+eits_status eits_fast_report(eits_fast *fast, const eits_touch *found, uint32_t n_found,
+                             eits_touch *touches, uint32_t *count)
 {
-    uint8_t taken[EITS_MAX_TOUCHES] = {0}, used[EITS_MAX_TOUCHES] = {0};
-    if (touches == NULL || count == NULL || n_tracked > EITS_FAST_TOUCHES ||
-        n_found > EITS_MAX_TOUCHES || n_before > EITS_MAX_TOUCHES)
+    uint8_t taken[EITS_MAX_TOUCHES] = {0};
+    eits_touch rest[EITS_MAX_TOUCHES];
+    uint32_t n_rest = 0;
+    if (fast == NULL || touches == NULL || count == NULL || n_found > EITS_MAX_TOUCHES ||
+        (found == NULL && n_found > 0))
         return EITS_E_ARGUMENT;
-    eits_real here[EITS_MAX_TOUCHES][2], there[EITS_MAX_TOUCHES][2];
-    places_of(found, n_found, here);
-    places_of(before, n_before, there);
-    *count = 0;
-    for (uint32_t k = 0; k < n_tracked; ++k) {
-        const eits_fast_touch *t = &tracked[k];
-        const eits_real place[2] = {t->x_mm, t->y_mm};
-        const uint32_t n = eits_fast_nearest(place, (const eits_real(*)[2])here, taken, n_found);
-        touches[*count] = alone(t);
-        if (n < n_found) {
-            taken[n] = 1;
-            touches[*count] = found[n];
-            touches[*count].id = t->id;
-            touches[*count].confirmed = 1;
+    const int drives = fast->aligned != 0;
+    fast->aligned = 0;
+    fast->n_followed = drives ? fast->n_followed : 0;
+    *count = report_followed(fast, found, n_found, taken, touches);
+    if (found != NULL) {
+        for (uint32_t n = 0; n < n_found; ++n) {
+            if (!taken[n])
+                rest[n_rest++] = found[n];
         }
-        ++*count;
-    }
-    /* A touch that drives do not follow, such as the sixth, is reported where the frame before
-     * showed it, too: a single frame may show a touch that landed while it was scanned aside. */
-    for (uint32_t n = 0; n < n_found && *count < EITS_MAX_TOUCHES; ++n) {
-        const uint32_t last =
-            taken[n] ? n_before
-                     : eits_fast_nearest(here[n], (const eits_real(*)[2])there, used, n_before);
-        if (last == n_before)
-            continue;
-        used[last] = 1;
-        touches[*count] = found[n];
-        touches[*count].id += EITS_FAST_FRAME_IDS;
-        touches[*count].confirmed = 1;
-        ++*count;
+        follow(fast, rest, n_rest, drives);
+        report_seen(fast, drives, touches, count);
     }
     sort(touches, *count);
     return EITS_OK;

@@ -28,16 +28,22 @@ static int is_cell(const eits_pixel *pixel)
     return pixel->ix % 2 == 0 && pixel->iy % 2 == 0;
 }
 
+/* Whether drives can be followed: what touches answer to them is predicted by the fields. */
+static int has_fields(const eits_model *model)
+{
+    return model->fields.at.data != NULL;
+}
+
 static shape shape_of(const eits_model *model)
 {
     shape s = {0, 0};
-    for (uint32_t i = 0; i < model->n_rows; ++i) {
+    for (uint32_t i = 0; i < model->n_rows && has_fields(model); ++i) {
         uint32_t before, after;
         count_rows(model, i, &before, &after);
         s.drives += before == 0;
         s.most_rows = after > s.most_rows ? after : s.most_rows;
     }
-    return s;
+    return s.most_rows <= EITS_FAST_MAX_ROWS ? s : (shape){0, 0};
 }
 
 /* The next of the memory that is handed out, all zero. */
@@ -66,11 +72,9 @@ static void lay_out(uint8_t *next, const eits_model *model, shape s, eits_fast *
 
 size_t eits_fast_size(const eits_model *model)
 {
-    if (model == NULL || model->fields.at.data == NULL)
+    if (model == NULL)
         return 0;
     const shape s = shape_of(model);
-    if (s.most_rows > EITS_FAST_MAX_ROWS)
-        return 0;
     return EITS_FAST_SIZE(model->n_rows, s.drives, s.most_rows, model->nx, model->ny);
 }
 
@@ -79,7 +83,7 @@ static void list(eits_fast *fast)
 {
     const eits_model *model = fast->model;
     uint32_t row = 0;
-    for (uint32_t i = 0; i < model->n_rows; ++i) {
+    for (uint32_t i = 0; i < model->n_rows && fast->most_rows > 0; ++i) {
         uint32_t before, after;
         count_rows(model, i, &before, &after);
         if (before > 0)
@@ -102,7 +106,7 @@ static void list(eits_fast *fast)
 
 eits_status eits_fast_init(void *memory, size_t size, const eits_context *ctx, eits_fast **fast)
 {
-    if (memory == NULL || ctx == NULL || fast == NULL || eits_fast_size(ctx->model) == 0)
+    if (memory == NULL || ctx == NULL || fast == NULL)
         return EITS_E_ARGUMENT;
     if (size < eits_fast_size(ctx->model) || (uintptr_t)memory % 16 != 0)
         return EITS_E_WORKSPACE;
@@ -127,6 +131,8 @@ eits_status eits_fast_begin(eits_fast *fast)
         return EITS_E_ARGUMENT;
     const eits_reference *reference = &fast->ctx->reference;
     fast->begun = 0;
+    if (!fast->driven && fast->next_id <= fast->seen_ids)
+        fast->next_id = fast->seen_ids + 1;
     /* Without noise every residual would be news, and chi-squares infinite. */
     if (!reference->ready || !(reference->noise_v > 0))
         return EITS_E_NO_REFERENCE;

@@ -72,11 +72,10 @@ void eits_reference_tracking_add(eits_context *ctx, const eits_real *frame);
 /* Drop the mean under way: the frames to come have nothing to do with it. */
 void eits_reference_tracking_break(eits_context *ctx);
 
-/* The frame added last has the `count` touches; `followed` is their number together with tentative
- * and held ones, or EITS_TOUCHES_UNKNOWN if the frame cannot be used. Returns 1 if the reference
- * moved; adds to `macs`. Overwrites frame.d and scratch. */
+/* The frame added last has the `count` touches; not `known`: the frame cannot be used. Returns 1 if
+ * the reference moved; adds to `macs`. Overwrites frame.d and scratch. */
 int eits_reference_tracking_end(eits_context *ctx, const eits_scratch *scratch,
-                                const eits_touch *touches, uint32_t count, uint32_t followed,
+                                const eits_touch *touches, uint32_t count, int known,
                                 uint64_t *macs);
 
 #endif

@@ -5,9 +5,9 @@
  * therefore move while nothing touches the skin. It must never move towards a touch: the touch
  * would fade, and leave its negative behind. With N = reference_frames:
  *
- *   - N / 16 consecutive frames without any touch (reported, tentative or held) are averaged. When
- * a touch comes or goes, these frames are dropped, and so are as many after it, in which the touch
- *     lands or a soft skin creeps back.
+ *   - N / 16 consecutive frames without any touch are averaged. When a touch comes or goes, these
+ *     frames are dropped, and so are as many after it, in which the touch lands or a soft skin
+ *     creeps back.
  *   - The mean's difference from the reference must not look like a touch too light to be detected:
  *     no single column of S may explain nearly all of it. White noise, and drift of a whole sheet,
  *     spread over many columns.
@@ -214,17 +214,47 @@ static int grow(eits_context *ctx, const eits_scratch *scratch, const eits_touch
 
 /* ---- one frame after the other ---- */
 
+/* Whether each touch was there in the frame before, within options.follow_mm. */
+static int were_there(const eits_context *ctx, const eits_touch *touches, uint32_t count)
+{
+    const eits_reference_tracking *f = &ctx->reference.tracking;
+    const eits_real reach = ctx->options.follow_mm;
+    for (uint32_t k = 0; k < count; ++k) {
+        int there = 0;
+        for (uint32_t l = 0; l < count && !there; ++l) {
+            const eits_real dx = touches[k].x_mm - f->at[l][0], dy = touches[k].y_mm - f->at[l][1];
+            there = eits_fma(dx, dx, dy * dy) <= reach * reach;
+        }
+        if (!there)
+            return 0;
+    }
+    return 1;
+}
+
+/* Keep the touches of a frame, and drop the mean under way where they are other touches than those
+ * of the frame before. */
+static void keep_touches(eits_context *ctx, const eits_touch *touches, uint32_t count, int known)
+{
+    eits_reference_tracking *f = &ctx->reference.tracking;
+    const uint32_t now = known ? count : EITS_TOUCHES_UNKNOWN;
+    if (now != f->touches || (known && !were_there(ctx, touches, count)))
+        eits_reference_tracking_break(ctx);
+    f->touches = now;
+    for (uint32_t k = 0; k < count; ++k) {
+        f->at[k][0] = touches[k].x_mm;
+        f->at[k][1] = touches[k].y_mm;
+    }
+}
+
 int eits_reference_tracking_end(eits_context *ctx, const eits_scratch *scratch,
-                                const eits_touch *touches, uint32_t count, uint32_t followed,
+                                const eits_touch *touches, uint32_t count, int known,
                                 uint64_t *macs)
 {
     eits_reference *b = &ctx->reference;
     eits_reference_tracking *f = &b->tracking;
     if (!f->open)
         return 0;
-    if (followed != f->touches)
-        eits_reference_tracking_break(ctx);
-    f->touches = followed;
+    keep_touches(ctx, touches, count, known);
     f->open = 0;
     if (f->rest > 0) {
         --f->rest;
@@ -234,14 +264,14 @@ int eits_reference_tracking_end(eits_context *ctx, const eits_scratch *scratch,
     if (frames < frames_apart(ctx))
         return 0;
     f->frames = 0;
-    if (followed == EITS_TOUCHES_UNKNOWN)
+    if (!known)
         return 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const eits_real off = b->m2[i] / (eits_real)frames;
         b->m2[i] = eits_is_finite(off) ? b->v0[i] + off : b->v0[i];
     }
-    const int moved = followed == 0 ? move(ctx, scratch, frames, macs)
-                                    : grow(ctx, scratch, touches, count, frames, macs);
+    const int moved = count == 0 ? move(ctx, scratch, frames, macs)
+                                 : grow(ctx, scratch, touches, count, frames, macs);
     if (moved)
         b->ready = eits_fit_reference(ctx) == EITS_OK;
     return moved;

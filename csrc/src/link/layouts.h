@@ -16,7 +16,7 @@ _Static_assert(sizeof(eits_command_plain) == 4, "eits_command_plain has padding"
 _Static_assert(sizeof(eits_command_stream) == 12, "eits_command_stream has padding");
 _Static_assert(sizeof(eits_command_tare) == 8, "eits_command_tare has padding");
 _Static_assert(sizeof(eits_command_scan) == 24, "eits_command_scan has padding");
-_Static_assert(sizeof(eits_command_solver) == 44, "eits_command_solver has padding");
+_Static_assert(sizeof(eits_command_solver) == 40, "eits_command_solver has padding");
 _Static_assert(sizeof(eits_command_model_begin) == 12, "eits_command_model_begin has padding");
 _Static_assert(sizeof(eits_command_model_data) == 8, "eits_command_model_data has padding");
 _Static_assert(sizeof(eits_command_get_stats) == 8, "eits_command_get_stats has padding");

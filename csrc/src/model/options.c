@@ -37,12 +37,9 @@ eits_status eits_options_track(eits_options *options)
 {
     if (options == NULL)
         return EITS_E_ARGUMENT;
-    /* A lower threshold reports more noise as touches; confirmation over two frames removes those
+    /* A lower threshold reports more noise as touches; confirmation by a second frame removes those
      * again, and more of the light touches remain. The factor was fitted on tuning streams. */
     options->detection_factor *= EITS_TRACK_DETECTION;
-    options->track_confirm = EITS_TRACK_CONFIRM;
-    options->track_hold = EITS_TRACK_HOLD;
-    options->track_smooth = EITS_TRACK_SMOOTH;
     return EITS_OK;
 }
 

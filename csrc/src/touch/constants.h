@@ -210,37 +210,6 @@
  * misses the peak */
 #define EITS_STANDS_OUT_NEAR R(0.9990234375)
 
-/* ---- Chosen: on tuning streams, whose seed and runs were not kept. The study says what tracking
- * is worth; it varies its options, not these. Check: eitskin study tracking */
-
-/* a touch that explains less waits for confirmation: it may be half of another [of |y|^2]. larger:
- * light touches start late; smaller: halves are reported */
-#define EITS_SURE_FRACTION R(0.05)
-
-/* and one whose own S'y is less [lambda_noise]. larger: faint touches start late; smaller: noise is
- * reported at once */
-#define EITS_SURE_CLEARNESS R(1.5)
-
-/* how far a tentative touch may move: noise is found anywhere, a touch beside itself [of
- * follow_mm]. larger: noise confirms noise; smaller: fast fingers start late */
-#define EITS_TENTATIVE_REACH R(0.6)
-
-/* rms by which a velocity changes [of follow_mm a frame]. larger: places jitter; smaller: places
- * overshoot turns */
-#define EITS_SPEED_CHANGE R(0.028)
-
-/* rms of a new touch's velocity [of follow_mm a frame]. larger: first places jitter; smaller: fast
- * fingers lag at first */
-#define EITS_FIRST_SPEED R(0.12)
-
-/* no place is surer than this [pixels]. larger: clear touches are smoothed; smaller: a gain of
- * rounding */
-#define EITS_MIN_DEVIATION R(0.01)
-
-/* a faint touch found so often is reported while held [frames]. larger: faint touches flicker;
- * smaller: noise is held */
-#define EITS_KNOWN_FRAMES 4
-
 /* clang-format on */
 
 #endif

@@ -1,6 +1,5 @@
-/* Discs of changed conductivity, placed off the grid, what the skin answers to them in reduced
- * space, and touches followed from frame to frame: when tracks start and end, ids, places smoothed
- * in time (docs/guide/tracking.md says what each is worth). */
+/* Discs of changed conductivity, placed off the grid, and what the skin answers to them in reduced
+ * space. */
 #ifndef EITSKIN_DISC_H
 #define EITSKIN_DISC_H
 
@@ -49,14 +48,5 @@ int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc);
 
 /* The nearest place on a kept pixel to one that is next to it. */
 void eits_bring_onto_skin(const eits_context *ctx, eits_real *x_mm, eits_real *y_mm);
-
-/* From the `count` touches that were found in a frame (room for EITS_MAX_TOUCHES) to those that are
- * reported, in their place, strongest first; returns how many. info says how clear the frame
- * is.
- *
- * Nearest pairs of a touch that is followed and one that is found, within follow_mm, belong
- * together; those that were reported choose first. Ids count up from 1 and are given when a touch
- * is first reported. */
-uint32_t eits_track(eits_context *ctx, eits_touch *touches, uint32_t count);
 
 #endif

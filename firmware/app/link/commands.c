@@ -194,19 +194,6 @@ static fw_answer on_scan(fw_host_link *link, const void *payload, size_t size)
     return checked;
 }
 
-/* The options that tracking changes; without tracking they have the model's defaults. */
-static void set_tracking(const eits_model *model, eits_options *options, bool track)
-{
-    eits_options defaults;
-    (void)eits_options_default(model, &defaults);
-    options->detection_factor = defaults.detection_factor;
-    options->track_confirm = defaults.track_confirm;
-    options->track_hold = defaults.track_hold;
-    options->track_smooth = defaults.track_smooth;
-    if (track)
-        (void)eits_options_track(options);
-}
-
 /* The numbers of eits_solver have a gap at 2, which is reserved; for it the reply states the
  * greatest number that may be used. */
 static bool no_solver(fw_answer *out, uint32_t solver)
@@ -231,8 +218,7 @@ static fw_answer on_solver(fw_host_link *link, const void *payload, size_t size)
         fraction_outside(&bad, offsetof(eits_command_solver, gap_rel), c.gap_rel) ||
         no_solver(&bad, c.solver) ||
         outside(&bad, offsetof(eits_command_solver, diagnostics), c.diagnostics, 0,
-                EITS_DIAGNOSTICS_ALL) ||
-        outside(&bad, offsetof(eits_command_solver, track), c.track, 0, 1))
+                EITS_DIAGNOSTICS_ALL))
         return bad;
     if (fw_solve_model(link->solve) == NULL)
         return fw_refuse(EITS_REPLY_NO_MODEL, 0, 0);
@@ -246,7 +232,6 @@ static fw_answer on_solver(fw_host_link *link, const void *payload, size_t size)
     options.solver = (eits_solver)c.solver;
     options.mac_limit = c.mac_limit;
     options.diagnostics = c.diagnostics;
-    set_tracking(fw_solve_model(link->solve), &options, c.track != 0);
     const eits_status status = fw_solve_set_options(link->solve, &options);
     return status == EITS_OK ? ok() : fw_refuse(EITS_REPLY_CORE, (int32_t)status, 0);
 }

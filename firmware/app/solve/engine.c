@@ -29,7 +29,7 @@ static void *take(uint8_t **next, size_t bytes)
     return taken;
 }
 
-/* The tracker of touches after each drive, if there is room for it beside all the rest. */
+/* The tracker of touches, if there is room for it beside all the rest. */
 static void start_fast(fw_engine *engine, uint8_t *next)
 {
     const size_t bytes = EITS_ALIGN16(eits_fast_size(&engine->model));
@@ -37,7 +37,7 @@ static void start_fast(fw_engine *engine, uint8_t *next)
     const size_t numbers = EITS_ALIGN16(engine->model.n_rows * sizeof(uint16_t));
     engine->fast = NULL;
     engine->fast_bytes = 0;
-    if (bytes == 0 || next + bytes + frame + numbers > engine->saved.core)
+    if (next + bytes + frame + numbers > engine->saved.core)
         return;
     engine->aligned = take(&next, frame);
     engine->drive_of = take(&next, numbers);
@@ -91,7 +91,7 @@ static void list_unique(fw_engine *engine)
     }
 }
 
-/* Frames come in sequence, so touches are tracked over time. */
+/* Frames come in sequence, so touches are followed over time. */
 static eits_status start_core(fw_engine *engine)
 {
     const eits_status status = eits_init(engine->workspace, eits_workspace_size(&engine->model, 0),

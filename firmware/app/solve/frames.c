@@ -108,8 +108,8 @@ void fw_frame_solve(fw_solve *solve, const fw_frame *frame, const float *volts,
     if (touches && out->status == EITS_OK)
         (void)eits_find_touches(ctx, out->touches, EITS_MAX_TOUCHES, &out->count);
     eits_info info = *eits_get_info(ctx);
-    if (volts != frame->volts && out->status == EITS_OK)
-        out->count = fw_tracker_note(solve, out->touches, out->count, &info);
+    if (touches && out->status == EITS_OK)
+        out->count = fw_tracker_note(solve, volts != frame->volts, out->touches, out->count, &info);
     const uint32_t done_us = fw_now_us(solve->board);
     out->head = head_of(frame, &info, out->status);
     out->head.solve_us = solved_us - began_us;

@@ -27,8 +27,6 @@ typedef struct fw_tracker {
     bool noted;                      /* `touches` are news to the tracker */
     uint32_t count;
     eits_touch touches[EITS_MAX_TOUCHES]; /* that the solver found in the last frame it had */
-    uint32_t n_followed;
-    eits_fast_touch followed[EITS_FAST_TOUCHES]; /* when the last frame was aligned */
 } fw_tracker;
 
 struct fw_solve {

@@ -71,10 +71,11 @@ fw_tare_step fw_tare_add(fw_solve *solve, const fw_frame *frame, eits_status *st
         return FW_TARE_REFUSED_FRAME;
     if (++tare->taken < tare->wanted)
         return FW_TARE_TAKEN;
+    eits_forget(engine->ctx);
+    fw_tracker_new_reference(solve); /* drives are not tracked while the tare is active */
     tare->active = false;
     engine->saved.before_tare = engine->saved.tared;
     engine->tared = engine->phase_known = true;
-    eits_forget(engine->ctx);
     return FW_TARE_DONE;
 }
 
@@ -87,7 +88,7 @@ bool fw_tare_undo(fw_solve *solve)
     fw_engine_restore(engine);
     (void)eits_set_options(engine->ctx, &options);
     eits_forget(engine->ctx);
-    fw_tracker_forget(solve);
+    fw_tracker_new_reference(solve);
     engine->saved.before_tare = false;
     return true;
 }

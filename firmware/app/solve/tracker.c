@@ -8,7 +8,7 @@
 
 bool fw_tracker_possible(const fw_solve *solve)
 {
-    return solve->engine.fast != NULL && !solve->board->frames_given &&
+    return eits_fast_drives(solve->engine.fast) > 0 && !solve->board->frames_given &&
            eits_get_options(solve->engine.ctx)->reference_frames == 0 &&
            fw_acquire_settings(solve->acquire)->check_every == 1 &&
            solve->board->system->later != NULL;
@@ -22,6 +22,12 @@ bool fw_tracker_ready(const fw_solve *solve)
 void fw_tracker_forget(fw_solve *solve)
 {
     solve->tracker.running = solve->tracker.owed = false;
+}
+
+void fw_tracker_new_reference(fw_solve *solve)
+{
+    fw_tracker_forget(solve);
+    eits_fast_forget_all(solve->engine.fast);
 }
 
 bool fw_tracker_waits(const fw_solve *solve)
@@ -119,8 +125,6 @@ bool fw_tracker_align(fw_solve *solve, fw_frame *frame, const float **volts)
     tracker->noted = false;
     const eits_status status =
         eits_fast_align(engine->fast, frame->volts, engine->model.n_rows, engine->aligned, &state);
-    (void)eits_fast_touches(engine->fast, tracker->followed, EITS_FAST_TOUCHES,
-                            &tracker->n_followed);
     tracker->owed = false;
     if (status != EITS_OK)
         return true;
@@ -134,41 +138,34 @@ bool fw_tracker_align(fw_solve *solve, fw_frame *frame, const float **volts)
     return true;
 }
 
-/* Touches that the core holds although this frame does not show them were not found in it. */
-static uint32_t only_found(eits_touch *touches, uint32_t count)
-{
-    uint32_t kept = 0;
-    for (uint32_t k = 0; k < count; ++k) {
-        if (touches[k].explained > 0)
-            touches[kept++] = touches[k];
-    }
-    return kept;
-}
-
-uint32_t fw_tracker_note(fw_solve *solve, eits_touch *touches, uint32_t count, eits_info *info)
+uint32_t fw_tracker_note(fw_solve *solve, bool aligned, eits_touch *touches, uint32_t count,
+                         eits_info *info)
 {
     fw_tracker *tracker = &solve->tracker;
+    eits_fast *fast = solve->engine.fast;
     eits_touch reported[EITS_MAX_TOUCHES];
-    uint32_t reports = 0;
-    count = only_found(touches, count);
-    (void)eits_fast_report(tracker->followed, tracker->n_followed, touches, count, tracker->touches,
-                           tracker->count, reported, &reports);
-    memcpy(tracker->touches, touches, count * sizeof touches[0]);
-    tracker->count = count;
-    tracker->noted = true;
-    (void)eits_fast_name(solve->engine.fast, info);
-    if (reports < count) /* the touches' image would lack one */
+    uint32_t reports = 0, found = 0;
+    if (fast == NULL) /* there was no room for it: ids number the touches of each frame */
+        return count;
+    (void)eits_fast_report(fast, touches, count, reported, &reports);
+    if (aligned) {
+        memcpy(tracker->touches, touches, count * sizeof touches[0]);
+        tracker->count = count;
+        tracker->noted = true;
+        (void)eits_fast_name(fast, info);
+    }
+    for (uint32_t k = 0; k < reports; ++k)
+        found += reported[k].explained > 0;
+    if (found < count) /* the touches' image would lack one */
         info->shown = EITS_SHOWN_SOLVER;
     info->touches = reports;
     memcpy(touches, reported, reports * sizeof touches[0]);
     return reports;
 }
 
-uint32_t fw_tracker_report(const fw_solve *solve, eits_touch *touches)
+uint32_t fw_tracker_report(fw_solve *solve, eits_touch *touches)
 {
-    const fw_tracker *tracker = &solve->tracker;
     uint32_t count = 0;
-    (void)eits_fast_report(tracker->followed, tracker->n_followed, NULL, 0, NULL, 0, touches,
-                           &count);
+    (void)eits_fast_report(solve->engine.fast, NULL, 0, touches, &count);
     return count;
 }

@@ -45,18 +45,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--second-pass",
         "solve again after the interaction of touches is removed from the data",
     )
-    track = parser.add_mutually_exclusive_group()
-    option(
-        track,
-        "--track",
-        "treat the frames as a stream: confirm new touches, keep ids, smooth places, as a board"
-        " does (default: if the frames have ascending times)",
-    )
-    option(track, "--no-track", "find the touches of each frame independently")
     option(
         parser,
         "--threads N",
-        "solve N frames in parallel, with the same results; not with --warm or --track",
+        "solve N frames in parallel, each by itself: touches of frames with times are then not"
+        " followed; not with --warm",
         default=1,
     )
     option(parser, "--saturation-v V", "leave out rows at or beyond +-V", float)
@@ -82,7 +75,6 @@ def run(options: argparse.Namespace) -> int:
         engine=options.engine,
         changes=changes | named_solver(options),
         preset=read_preset(options, "host"),
-        track=True if options.track else False if options.no_track else None,
         threads=options.threads,
         only=None if options.only is None else tuple(options.only.split(",")),
     )

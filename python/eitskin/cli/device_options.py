@@ -91,9 +91,6 @@ def add_scan(parser: argparse.ArgumentParser) -> None:
     start = solver.add_mutually_exclusive_group()
     option(start, "--warm", "start each frame from the last one's result")
     option(start, "--cold", "start each frame from zero (default)")
-    track = solver.add_mutually_exclusive_group()
-    option(track, "--track", "confirm new touches, keep ids, smooth places (default)")
-    option(track, "--no-track", "find the touches of each frame independently")
     tare = parser.add_argument_group("reference")
     option(
         tare,
@@ -251,7 +248,6 @@ def read_solver(options: argparse.Namespace) -> SolverSettings:
         warm_start=True if options.warm else False if options.cold else None,
         sign=options.sign,
         diagnostics=read_ignored(options.ignore),
-        track=True if options.track else False if options.no_track else None,
         **named_solver(options),
     )
 

@@ -92,4 +92,5 @@ class Touch:
     # one expected of touches of this strength, and the change of conductivity, the strength over
     # the area, is not known either
     radius_sd_mm: float | None = None
-    confirmed: bool = True  # 1: a whole frame has shown it; 0: only drives have (fast.h)
+    # 0: drives alone have shown it, or the first frame of frames alone (eits_fast_report)
+    confirmed: bool = True

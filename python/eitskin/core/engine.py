@@ -200,7 +200,7 @@ class CoreEngine:
 
     @one_at_a_time
     def forget(self) -> None:
-        """Forget the coefficients for the warm start and the tracked touches."""
+        """Forget the coefficients for the warm start."""
         self._lib.eits_forget(self._context)
 
     def _check_frame(self, status: int, what: str) -> None:

@@ -1,4 +1,5 @@
-"""The fast path of the C core: touches after each drive of a scan (csrc/include/eitskin/fast.h)."""
+"""The tracker of the C core: touches after each drive of a scan, and of whole frames
+(csrc/include/eitskin/fast.h)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,8 +11,8 @@ import numpy.typing as npt
 from eitskin.arrays import AnyArray, IntArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine, aligned, c_touches, touch_of
-from eitskin.core.results import Info
-from eitskin.errors import FrameError, UsageError
+from eitskin.core.results import Info, Reconstruction
+from eitskin.errors import FrameError
 from eitskin.threads import one_at_a_time, refuse_copy
 
 
@@ -45,12 +46,9 @@ class AlignedFrame:
 
 
 class FastCore:
-    """The fast path that works beside a core ``engine`` and uses its reference, its options and its
-    lock.
-
-    Raises:
-    UsageError: the model has no fields, or a drive has too many rows.
-    """
+    """The tracker that works beside a core ``engine`` and uses its reference, its options and its
+    lock. ``rows`` are those of each drive that it can take: none if the model has no fields, or a
+    drive too many rows. It then follows touches from frame to frame."""
 
     def __init__(self, engine: CoreEngine) -> None:
         self._engine, self.lock = engine, engine.lock
@@ -60,19 +58,13 @@ class FastCore:
     def _begin_beside(self, lib: Any, ffi: Any, model: Any, context: Any) -> None:
         self._lib, self._ffi = lib, ffi
         self.bytes = int(self._lib.eits_fast_size(model))
-        if not self.bytes:
-            raise UsageError(
-                "fast path: the model has no fields (section FLDS), or a drive over"
-                f" {self._lib.EITS_FAST_ROWS} rows; build it again, of difference data"
-            )
         self._memory = aligned(self.bytes)
         state = self._ffi.new("eits_fast **")
         memory = self._ffi.from_buffer(self._memory)
         self._check(self._lib.eits_fast_init(memory, self.bytes, context, state))
         self._state = state[0]
         self._touches = self._ffi.new("eits_fast_touch[]", int(self._lib.EITS_FAST_TOUCHES))
-        self._followed = self._ffi.new("eits_fast_touch[]", int(self._lib.EITS_FAST_TOUCHES))
-        self._n_followed = 0
+        self._frame = self._ffi.new("eits_touch[]", int(self._lib.EITS_MAX_TOUCHES))
         self._number = self._ffi.new("uint32_t *")
         self.rows = [self._rows_of(k) for k in range(self._lib.eits_fast_drives(self._state))]
 
@@ -140,12 +132,6 @@ class FastCore:
             self._lib.eits_fast_align(self._state, pointer, given.size, pointer, self._number)
         )
         state = self._number[0]
-        self._check(
-            self._lib.eits_fast_touches(
-                self._state, self._followed, len(self._followed), self._number
-            )
-        )
-        self._n_followed = int(self._number[0])
         return AlignedFrame(
             given,
             bool(state & self._lib.EITS_FAST_EXPLAINED),
@@ -168,27 +154,36 @@ class FastCore:
         return self.touches()
 
     @one_at_a_time
-    def report(self, found: Sequence[Touch], before: Sequence[Touch]) -> tuple[Touch, ...]:
-        """Return the touches of the last aligned frame, the strongest first: those that drives
-        followed then, with what the engine ``found`` of them in it; nothing, where it was not
-        solved. A touch that it found and drives do not follow is reported if it was also found in
-        the frame ``before``.
+    def report(self, found: Sequence[Touch] | None) -> tuple[Touch, ...]:
+        """Return the touches of a frame, the strongest first; ``found``: those that the engine
+        found in it, None where it was not solved. After :meth:`aligned` they are the touches that
+        drives followed then, with what the engine found of them; else those that it found, with
+        ids that follow them from frame to frame. Call this once per frame.
 
         Raises:
             FrameError: there are more touches than the core can report.
         """
-        room = int(self._lib.EITS_MAX_TOUCHES)
-        touches = self._ffi.new("eits_touch[]", room)
-        given, last = (
-            self._ffi.new("eits_touch[]", c_touches(each) or 1) for each in (found, before)
-        )
+        null = self._ffi.NULL
+        given = null if found is None else self._ffi.new("eits_touch[]", c_touches(found) or 1)
+        count = 0 if found is None else len(found)
         self._check(
-            self._lib.eits_fast_report(
-                self._followed, self._n_followed, given, len(found), last, len(before), touches,
-                self._number,
-            )
-        )  # fmt: skip
-        return tuple(touch_of(touches[k]) for k in range(self._number[0]))
+            self._lib.eits_fast_report(self._state, given, count, self._frame, self._number)
+        )
+        return tuple(touch_of(self._frame[k]) for k in range(self._number[0]))
+
+    def followed(self, result: Reconstruction) -> Reconstruction:
+        """Return ``result`` of a frame with the touches that :meth:`report` gives of its own. The
+        image of the touches shows the frame only if all that were found are among them."""
+        touches = self.report(result.touches)
+        info, image = replace(result.info, touches=len(touches)), result.touch_image
+        if sum(touch.explained > 0 for touch in touches) < len(result.touches):
+            info, image = replace(info, shown="solver"), None
+        return replace(result, touches=touches, info=info, touch_image=image)
+
+    @one_at_a_time
+    def forget(self) -> None:
+        """Forget all touches; ids count on. Drives are refused until :meth:`begin`."""
+        self._lib.eits_fast_forget_all(self._state)
 
     @one_at_a_time
     def named(self, found: Info) -> Info:

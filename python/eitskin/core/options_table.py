@@ -15,7 +15,6 @@ INTERACTION = 4
 JOINT = 32
 ALL_TOUCH_FIT = 39
 MAX_TOUCHES = 16
-MAX_TRACK_FRAMES = 1000
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,8 @@ class OptionFields:
     # weight, against the data, of the radius that touch_change_s_per_m implies, relative to the
     # touch's own energy
     touch_radius_weight: float
-    # a touch keeps its id if it moved by at most this distance since the last frame
+    # how far from where its velocity brings it a touch may be found in the next frame and keep its
+    # id
     follow_mm: float
     # 1: discs start where they explain most of the data, one after the other, and each is placed
     # again beside the others; 0: they start at the image's peaks. The default is 0, in taught
@@ -80,14 +80,6 @@ class OptionFields:
     # interaction taken out of the data; image and info are then those of the second solve. Ignored
     # with a mac_limit
     second_pass: bool = False
-    # a touch is reported after it was found in this many consecutive frames; 0, 1: at once
-    track_confirm: int = 0
-    # a touch that is not found keeps its id for this many frames; it is still reported if it was
-    # faint before
-    track_hold: int = 0
-    # > 0: smooth places, radii and strengths in time; the value is the uncertainty, in pixels, of
-    # the place of a touch whose S'y equals that of noise
-    track_smooth: float = 0.0
     # the whitening's regularisation is at least this times noise_v / v0_rms, if both are known; 0:
     # it is the model's
     regularisation_noise_factor: float = 5.0
@@ -130,9 +122,6 @@ RANGES: dict[str, tuple[float, float]] = {
     "mac_limit": (0, 2**32 - 1),
     "diagnostics": (0, 511),
     "touch_fit": (0, 39),
-    "track_confirm": (0, MAX_TRACK_FRAMES),
-    "track_hold": (0, MAX_TRACK_FRAMES),
-    "track_smooth": (0, 1e30),
     "regularisation_noise_factor": (0, 1e30),
     "test_columns": (0, 2**32 - 1),
     "reference_frames": (0, 2**32 - 1),

@@ -30,11 +30,6 @@ from eitskin.errors import FrameError, UsageError
 class Options(OptionFields):
     """The options of the core; tables/options.toml explains each."""
 
-    @property
-    def tracks(self) -> bool:
-        """Return whether touches depend on earlier frames, apart from their ids."""
-        return self.track_confirm > 1 or self.track_hold > 0 or self.track_smooth > 0
-
 
 _OPTION_KINDS = get_type_hints(Options)
 

@@ -213,7 +213,7 @@ class Device(CommandExchange):
 
     def solver(self, options: Options) -> None:
         """Give the board's solver these of ``options``: iterations, max_touches, warm_start, sign,
-        lambda_rel, gap_rel, solver, mac_limit, diagnostics, and whether touches are tracked.
+        lambda_rel, gap_rel, solver, mac_limit and diagnostics.
 
         Raises:
             UsageError: one is out of its range.
@@ -226,7 +226,7 @@ class Device(CommandExchange):
                 CHOICES["sign"][options.sign],
                 options.lambda_rel, options.gap_rel, CHOICES["solver"][options.solver],
                 options.mac_limit,
-                options.diagnostics, int(options.tracks),
+                options.diagnostics,
             ),
             ANSWER_S,
         )  # fmt: skip

@@ -76,10 +76,8 @@ def scanned_protocol(info: BoardInfo, known: KnownModel | None, name: str) -> Pr
     )
 
 
-def board_options(model: Model, board: BoardInfo | None = None, *, track: bool = True) -> Options:
-    """The options that a board starts with: the model's own, the noise floor of ``board``'s
-    converter, and touches tracked; or without that."""
-    options = default_options(model)
-    if board is not None:
-        options = replace(options, noise_floor_v=board.noise_floor_v)
-    return tracking(options) if track else options
+def board_options(model: Model, board: BoardInfo | None = None) -> Options:
+    """The options that a board starts with: the model's own for frames that follow each other, with
+    the noise floor of ``board``'s converter."""
+    options = tracking(default_options(model))
+    return options if board is None else replace(options, noise_floor_v=board.noise_floor_v)

@@ -34,7 +34,7 @@ class ScanSettings(_Settings):
 @dataclass(frozen=True)
 class SolverSettings(_Settings):
     """The board's solver; None stays at the model's own, ``warm_start`` at off, ``mac_limit`` at
-    none, ``diagnostics`` at all, ``track`` at on."""
+    none, ``diagnostics`` at all."""
 
     iterations: int | None = None
     gap_rel: float | None = None
@@ -45,12 +45,10 @@ class SolverSettings(_Settings):
     solver: str | None = None
     mac_limit: int | None = None
     diagnostics: int | None = None
-    track: bool | None = None
 
     def applied(self, model: Model, board: BoardInfo) -> Options:
         """The options that ``board`` with ``model`` starts with, with these changes."""
-        changes = {name: value for name, value in self.named.items() if name != "track"}
-        return replace(board_options(model, board, track=self.track is not False), **changes)
+        return replace(board_options(model, board), **self.named)
 
 
 def apply_scan(device: Device, scan: ScanSettings) -> None:

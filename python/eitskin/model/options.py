@@ -6,10 +6,7 @@ import numpy as np
 
 from eitskin.core.constants_table import (
     REFERENCE_TRACKING_FRAMES,
-    TRACK_CONFIRM,
     TRACK_DETECTION,
-    TRACK_HOLD,
-    TRACK_SMOOTH,
 )
 from eitskin.core.options_table import ALL_TOUCH_FIT, MAX_TOUCHES, OF_MODEL
 from eitskin.core.results import Options
@@ -33,14 +30,8 @@ def default_options(model: Model) -> Options:
 
 
 def tracking(options: Options) -> Options:
-    """Return ``options``, from :func:`default_options`, for consecutive frames. The result equals
-    that of eits_options_track in the C core, bit by bit in float32. docs/guide/tracking.md shows
-    the gain."""
+    """Return ``options``, from :func:`default_options`, for consecutive frames: the detection
+    threshold is lower, since touches from noise are not found in a second frame. The result equals
+    that of eits_options_track in the C core, bit by bit in float32."""
     detection_factor = float(np.float32(options.detection_factor) * np.float32(TRACK_DETECTION))
-    return replace(
-        options,
-        detection_factor=detection_factor,
-        track_confirm=TRACK_CONFIRM,
-        track_hold=TRACK_HOLD,
-        track_smooth=float(np.float32(TRACK_SMOOTH)),
-    )
+    return replace(options, detection_factor=detection_factor)

@@ -45,10 +45,8 @@ class ReconstructSettings:
         engine: "c", "c64" or "numpy".
         changes: options of the solver by name (``core.results.Options``).
         preset: a preset whose measured settings are used; or None.
-        track: whether touches are tracked from frame to frame, as a board does; None tracks them if
-            the frames are a stream, which their times show, and ``threads`` is 1.
-        threads: how many frames are solved in parallel, with the same results; it must be 1 with a
-            warm start, tracking or numpy.
+        threads: how many frames are solved in parallel, each by itself; it must be 1 with a warm
+            start or numpy.
         only: names of the frames to reconstruct; None is all.
     """
 
@@ -56,18 +54,18 @@ class ReconstructSettings:
     engine: str = "c"
     changes: dict[str, Any] = field(default_factory=dict)
     preset: Preset | None = None
-    track: bool | None = None
     threads: int = 1
     only: tuple[str, ...] | None = None
 
     @property
-    def follows(self) -> bool:
-        """Return whether the result of a frame depends on earlier frames."""
-        return bool(self.track) or bool(self.changes.get("warm_start"))
+    def warm(self) -> bool:
+        """Return whether each frame starts from the last one's result."""
+        return bool(self.changes.get("warm_start"))
 
     def tracked(self, frames: Frames) -> bool:
-        """Return whether the touches of ``frames`` are tracked."""
-        return is_stream(frames) and self.threads == 1 if self.track is None else self.track
+        """Return whether the touches of ``frames`` are followed from frame to frame: the frames are
+        a stream, and one thread solves them in the C core."""
+        return is_stream(frames) and self.threads == 1 and self.engine != "numpy"
 
 
 def is_stream(frames: Frames) -> bool:
@@ -77,12 +75,8 @@ def is_stream(frames: Frames) -> bool:
 
 
 IDS_OF_FRAMES = (
-    "the frames have no times, so ids number the touches of each frame alone; if the frames are a"
-    " stream, say --track, or import them with --time"
-)
-IDS_WITHOUT_ORDER = (
-    "the frames are not taken for a stream, so ids number the touches of each frame alone; if they"
-    " follow each other, say --track"
+    "the frames have no ascending times, so ids number the touches of each frame alone; if the"
+    " frames are a stream, import them with --time"
 )
 
 
@@ -136,17 +130,15 @@ def reconstruct_frames(
     check(how, output, picture, film)
     notes: list[str] = []
     frames, chosen = read(path, how.only)
-    undecided = how.track is None
-    how = replace(how, track=how.tracked(frames))
     reconstructor, blob, name = choose_model(path, frames, how)
     know_converter(reconstructor, frames)
-    point = apply_options(reconstructor, how, notes)
+    point = apply_options(reconstructor, frames, how, notes)
     reference = take_reference(path, reconstructor, frames, notes)
     results, refused = solve(reconstructor, blob, frames, chosen, how, progress)
     scores = score(reconstructor.model, frames, results, reconstructor.options.sign, point, notes)
     several = sum(bool(one.touches) for one in results.values()) > 1
-    if undecided and not how.track and several and not scores:
-        notes.append(IDS_OF_FRAMES if frames.time_s is None else IDS_WITHOUT_ORDER)
+    if not is_stream(frames) and several and not scores:
+        notes.append(IDS_OF_FRAMES)
     outcome = ReconstructOutcome(
         frames, reconstructor.model, name, how.engine, point, reference, results, refused, scores,
         tuple(notes),
@@ -161,8 +153,7 @@ def check(
     """Reject invalid settings before any file is read."""
     if check_threads(how.threads) > 1:
         reasons = {
-            "--warm starts each frame from the last one": how.changes.get("warm_start"),
-            "--track needs one frame after another": how.track,
+            "--warm starts each frame from the last one": how.warm,
             "the numpy engine uses one thread": how.engine == "numpy",
         }
         for reason, applies in reasons.items():
@@ -213,12 +204,12 @@ def know_converter(reconstructor: Reconstructor, frames: Frames) -> None:
 
 
 def apply_options(
-    reconstructor: Reconstructor, how: ReconstructSettings, notes: list[str]
+    reconstructor: Reconstructor, frames: Frames, how: ReconstructSettings, notes: list[str]
 ) -> OperatingPoint | None:
     """Set the solver's options; with a preset, set and return the operating point that fulfils
     it."""
     reconstructor.set_options(**how.changes)
-    if how.track:
+    if how.tracked(frames):
         reconstructor.set_options(tracking(reconstructor.options))
     if how.preset is None:
         return None
@@ -270,7 +261,7 @@ def solve(
         batch.tare(frames.reference_voltage_v)
         solved = batch.each(frames.voltage_v[chosen])
     else:
-        solved = _one_by_one(reconstructor, frames.voltage_v[chosen], how.follows)
+        solved = _one_by_one(reconstructor, frames.voltage_v[chosen], how.tracked(frames), how.warm)
     results: Results = {}
     refused: dict[int, str] = {}
     for number, result in zip(chosen, progress(solved, len(chosen)), strict=True):
@@ -282,13 +273,13 @@ def solve(
 
 
 def _one_by_one(
-    reconstructor: Reconstructor, frames_v: Any, follows: bool
+    reconstructor: Reconstructor, frames_v: Any, tracked: bool, warm: bool
 ) -> Iterator[Reconstruction | FrameError]:
     for frame_v in frames_v:
-        if not follows:
+        if not (tracked or warm):
             reconstructor.forget()
         try:
-            yield reconstructor.reconstruct(frame_v)
+            yield reconstructor.follow(frame_v) if tracked else reconstructor.reconstruct(frame_v)
         except FrameError as error:
             yield error
 

@@ -4,7 +4,6 @@ without Python's lock."""
 import os
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
@@ -50,11 +49,11 @@ def check_threads(threads: int | None) -> int:
 class Batch:
     """Contexts of the C core, one per thread, with the same model, options and reference.
 
-    Each frame is reconstructed independently, as after :meth:`Reconstructor.forget`: bits, counts
-    and ids (in the order of the frames) are the same for any number of threads. ``engine`` is "c"
-    or "c64"; ``threads`` None uses all processors. While a thread goes through ``each``, other
-    threads are refused: a batch uses the processors by itself. Pickled or copied, it keeps model,
-    options, masked rows and reference.
+    Each frame is reconstructed independently, as after :meth:`Reconstructor.forget`: bits and
+    counts are the same for any number of threads, and ids number the touches of each frame.
+    ``engine`` is "c" or "c64"; ``threads`` None uses all processors. While a thread goes through
+    ``each``, other threads are refused: a batch uses the processors by itself. Pickled or copied,
+    it keeps model, options, masked rows and reference.
 
     Raises:
         UsageError: the engine is unknown, an option or the number of threads is out of range, or
@@ -161,7 +160,7 @@ class Batch:
             finally:
                 free.put(engine)
 
-        next_id, number, last = 1, 0, self._last
+        number, last = 0, self._last
         with ThreadPoolExecutor(self.threads) as pool:
             for results in pool.map(run, range(0, len(frames), size)):
                 self._turn.go_on(mine)
@@ -171,9 +170,7 @@ class Batch:
                         yield result
                         continue
                     last = frames[number - 1 : number].copy()
-                    numbered = (replace(t, id=k) for k, t in enumerate(result.touches, next_id))
-                    yield replace(result, touches=tuple(numbered))
-                    next_id += len(result.touches)
+                    yield result
         self._last = last
 
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from eitskin.arrays import BoolArray, FloatArray
 from eitskin.config import nearest
 from eitskin.core.engine import CoreEngine
+from eitskin.core.fast import FastCore
 from eitskin.core.results import (
     LearnedReference,
     Options,
@@ -44,8 +45,8 @@ class Reconstructor:
     are left out if that helps, and ``info.found`` names them (docs/reference/diagnostics.md); the
     option ``diagnostics`` chooses what is checked.
 
-    Threads may share one: each call is carried out as a whole, and touches are tracked in the order
-    of the calls. Streams that should not share touches need a reconstructor each, so a second
+    Threads may share one: each call is carried out as a whole, and touches are followed in the
+    order of the calls. Streams that should not share touches need a reconstructor each, so a second
     thread cannot begin a stream beside another's. Pickled or copied, it keeps model, options,
     masked rows and reference as they were given; tracked touches, and what the reference has
     learned since the tare, stay behind.
@@ -81,6 +82,8 @@ class Reconstructor:
         self.lock: threading.RLock = self._engine.lock
         self._blob, self._masked = blob, np.zeros(model.protocol.n_rows, dtype=bool)
         self._untouched: FloatArray | None = None
+        engine_of_c = self.c_engine
+        self._tracker = None if engine_of_c is None else FastCore(engine_of_c)
         self._streams = OneReader("the touches of this Reconstructor's stream", OTHERS)
         self._options = default_options(model)
         self.set_options(options or self._options)
@@ -151,6 +154,8 @@ class Reconstructor:
         with self.lock:
             learned = self._engine.set_reference(frames)
             self._untouched = frames.copy()
+            if self._tracker is not None:
+                self._tracker.forget()
         return learned
 
     def mask_rows(self, rows: BoolArray) -> None:
@@ -171,7 +176,7 @@ class Reconstructor:
             self._masked = given.copy()
 
     def reconstruct(self, frame_v: npt.ArrayLike, *, touches: bool = True) -> Reconstruction:
-        """Reconstruct one frame (m,) in V.
+        """Reconstruct one frame (m,) in V by itself: ids number its touches.
 
         Raises:
             FrameError: the frame cannot be used, or no reference has been taken.
@@ -179,8 +184,20 @@ class Reconstructor:
         result = self._engine.reconstruct(frame_numbers(frame_v, "frame"), touches=touches)
         return replace(result, model=self.model)
 
+    def follow(self, frame_v: npt.ArrayLike) -> Reconstruction:
+        """Reconstruct the next frame (m,) of a stream: a touch keeps its id from frame to frame, is
+        ``confirmed`` by its second frame, and reported only then if it is doubtful
+        (docs/guide/tracking.md). The numpy engine follows nothing.
+
+        Raises:
+            FrameError: the frame cannot be used, or no reference has been taken.
+        """
+        with self.lock:
+            result = self.reconstruct(frame_v)
+            return result if self._tracker is None else self._tracker.followed(result)
+
     def stream(self, frames_v: Iterable[npt.ArrayLike]) -> Iterator[Reconstruction]:
-        """Reconstruct frames one after another; a touch keeps its id from frame to frame.
+        """Reconstruct frames one after another as :meth:`follow` does.
 
         Raises:
             FrameError: a frame cannot be used, or no reference has been taken.
@@ -193,14 +210,16 @@ class Reconstructor:
         self._streams.begin(mine)
         try:
             for frame in frames_v:
-                yield self.reconstruct(frame)
+                yield self.follow(frame)
         finally:
             self._streams.end(mine)
 
     def forget(self) -> None:
-        """Forget the coefficients for the warm start and the tracked touches, so that the next
+        """Forget the coefficients for the warm start and the followed touches, so that the next
         frame does not depend on earlier ones."""
         self._engine.forget()
+        if self._tracker is not None:
+            self._tracker.forget()
 
 
 def _again(

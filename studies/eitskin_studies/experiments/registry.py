@@ -17,7 +17,6 @@ EXPERIMENTS = {
         "two to twelve touches: counts, positions, and when the core says that it cannot tell (Fig."
         " 12, Table 1)"
     ),
-    "tracking": "touches in streams of moving fingers: starts confirmed, ids held, places smoothed",
     "homogeneous": (
         "the 208-value waveform of an untouched skin, and what the doctor reads from it (Fig. 4b)"
     ),

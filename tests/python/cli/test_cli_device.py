@@ -326,7 +326,7 @@ def test_frames_of_a_recording_give_the_boards_touches(done, json_of, scene, tmp
     assert frames.protocol.hash == model.protocol.hash
     assert frames.meta["board"]["board"] == "simulated"
     board = json_lines(done(f"replay {run} --json"))[:-1]
-    host = json_of(f"reconstruct {exported} --track")["frames"]
+    host = json_of(f"reconstruct {exported}")["frames"]
     # the board has tracked them through the scans
     (here,), (there,) = host[-1]["touches"], board[-1]["touches"]
     assert [here["x_mm"], here["y_mm"]] == pytest.approx([there["x_mm"], there["y_mm"]], abs=1.5)

@@ -121,7 +121,6 @@ def test_threads_change_nothing(json_of, frames_file, ran):
     for arguments, text in (
         (("--threads", "0"), "use 1 to 256"),
         (("--threads", "2", "--warm"), "--warm starts each frame from the last one"),
-        (("--threads", "2", "--track"), "--track needs one frame after another"),
         (("--threads", "2", "--engine", "numpy"), "the numpy engine uses one thread"),
     ):
         assert text in ran(2, f"reconstruct {frames_file}", *arguments)[1]
@@ -149,8 +148,7 @@ def test_options_reach_the_solver(json_of, frames_file, changed_frames):
         == cold[5]["info"]["gap"]
         > 2 * warm[5]["info"]["gap"]
     )
-    assert len({frame["touches"][0]["id"] for frame in warm}) == 1
-    assert cold[5]["touches"][0]["id"] != cold[0]["touches"][0]["id"]
+    assert {frame["touches"][0]["id"] for frame in (*warm, *cold)} == {1}
     limit = str(0.999 * np.abs(session().frames_v).max())
     masked = json_of(f"reconstruct {frames_file} --saturation-v {limit}")
     assert max(frame["info"]["masked"] for frame in masked["frames"]) >= 1
@@ -271,21 +269,22 @@ def test_the_demo(tmp_path, ran):
     assert 0 < difference["C float32 to numpy"] < 1e-4 and difference["C float64 to numpy"] < 1e-9
 
 
-def test_tracked_frames_keep_ids_and_confirm_starts(json_of, tmp_path):
-    """A finger that moves 2 mm a frame keeps one id; each frame by itself counts on."""
+def test_a_stream_keeps_ids_and_confirms_touches(json_of, tmp_path):
+    """A finger that moves 2 mm a frame keeps one id, and lies where each frame by itself has it.
+    Its second frame confirms it."""
     moving = tuple(TouchScene(str(k), (Put(-20.0 + 2 * k, 30.0, 9.0, 5.0),)) for k in range(8))
     made = simulate(paper_skin(), adjacent(16), TouchSet("moving", 1, moving)).as_frames()
-    save_frames(tmp_path / "moving.npz", made)
-    alone, tracked = (
-        json_of(f"reconstruct {tmp_path / 'moving.npz'}", *more)["frames"]
-        for more in ((), ("--track",))
+    save_frames(tmp_path / "moving.npz", replace(made, time_s=np.arange(8) / 48))
+    (stream,), (alone,) = (
+        zip(*(frame["touches"] for frame in frames), strict=True)
+        for frames in (
+            json_of(f"reconstruct {tmp_path / 'moving.npz'}", *more)["frames"]
+            for more in ((), ("--threads", "2"))
+        )
     )
-    ids = [[touch["id"] for touch in frame["touches"]] for frame in tracked]
-    assert ids == [[1]] * 8
-    assert len({touch["id"] for frame in alone for touch in frame["touches"]}) == 8
-    assert tracked[0]["touches"][0]["x_mm"] == alone[0]["touches"][0]["x_mm"]
-    assert tracked[7]["touches"][0]["x_mm"] != alone[7]["touches"][0]["x_mm"]
-    assert tracked[7]["touches"][0]["x_mm"] == pytest.approx(-6.0, abs=2.0)
+    assert [touch["id"] for touch in stream] == [1] * 8
+    assert [touch["confirmed"] for touch in stream] == [False] + [True] * 7
+    assert [touch["x_mm"] for touch in stream] == [touch["x_mm"] for touch in alone]
 
 
 def test_frames_with_times_are_a_stream(json_of, tmp_path):
@@ -298,5 +297,4 @@ def test_frames_with_times_are_a_stream(json_of, tmp_path):
         facts = json_of(f"reconstruct {path}", *more)
         return [frame["touches"] for frame in facts["frames"]]
 
-    assert touches(timed) == touches(alone, "--track") != touches(alone)
-    assert touches(timed, "--no-track") == touches(alone) == touches(timed, "--threads", "2")
+    assert touches(timed) != touches(alone) == touches(timed, "--threads", "2")

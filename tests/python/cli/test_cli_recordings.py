@@ -129,7 +129,7 @@ def test_the_hosts_images_are_the_boards(done, json_of, run):
 
 @pytest.mark.parametrize(
     "options",
-    ["--cold", "--no-track", "--iterations 9", "--sign both", "--tare 1", "--reciprocal 0"],
+    ["--cold", "--iterations 9", "--sign both", "--tare 1", "--reciprocal 0"],
 )
 def test_whatever_the_solver_was_told(options, done, json_of, scene, tmp_path):
     path = tmp_path / "run.eits"

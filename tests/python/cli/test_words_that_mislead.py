@@ -166,11 +166,11 @@ def test_ids_without_times_are_explained(tmp_path, capsys):
     save_frames(tmp_path / "f.npz", frames)
     assert main(["reconstruct", str(tmp_path / "f.npz")]) == 0
     assert (
-        "ids number the touches of each frame alone; if the frames are a stream, say --track"
+        "ids number the touches of each frame alone; if the frames are a stream, import them with"
         in (capsys.readouterr().err)
     )
-    assert main(["reconstruct", str(tmp_path / "f.npz"), "--no-track"]) == 0
-    assert main(["reconstruct", str(tmp_path / "f.npz"), "--track"]) == 0
+    save_frames(tmp_path / "f.npz", replace(frames, time_s=np.arange(frames.n_frames) / 48))
+    assert main(["reconstruct", str(tmp_path / "f.npz")]) == 0
     assert "ids number" not in capsys.readouterr().err
 
 

@@ -43,7 +43,6 @@ OWNERS = {
     "evidence": {"evidence"},
     "multipole": {"multipole"},
     "joint": {"joint"},
-    "tracker": {"touch"},
     "columns": {"context"},
     "options": set(),
 }

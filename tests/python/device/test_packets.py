@@ -219,7 +219,7 @@ def test_a_command_lies_as_its_layout_says(request, what, every, frames):
 
 
 def test_floats_of_a_command_are_single():
-    command = link.Solver(10, 3, 1, 0, 0.03, 1e-4, 3, 10**9, 37, 1)
+    command = link.Solver(10, 3, 1, 0, 0.03, 1e-4, 3, 10**9, 37)
     request, *values = command.LAYOUT.struct.unpack(command.payload(5))
     assert (request, values[0]) == (5, 10)
     assert math.isclose(values[4], 0.03, rel_tol=1e-7)

@@ -27,7 +27,7 @@ ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 
 def test_frames_and_results_are_those_of_the_host_core_bit_for_bit():
-    """Of every second frame, whose touches are not tracked through scans."""
+    """Of every second frame, whose touches are followed from frame to frame."""
     model, blob = prebuilt()
     with sim_device() as device:
         device.send_command(cmd.StreamCommand(Stream.RAW), 1.0)
@@ -42,7 +42,7 @@ def test_frames_and_results_are_those_of_the_host_core_bit_for_bit():
     drawing = TouchDrawing(blob)
     skin.tare(np.array([raw.voltage_v for raw in untouched]))
     for raw, image, found in zip(raws, images, touches, strict=True):
-        result = skin.reconstruct(raw.voltage_v)
+        result = skin.follow(raw.voltage_v)
         assert image.image.tobytes() == result.solver_image.astype(np.float32).tobytes()
         assert found.touches == result.touches
         assert found.solved.shown == result.image_is == "touches" and result.touch_image is not None

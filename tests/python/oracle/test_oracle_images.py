@@ -353,11 +353,11 @@ def test_a_row_masked_at_the_reference_stays_out_until_the_next(engine):
 
 
 def test_the_engine_numpy_has_no_memory_and_counts_no_work():
-    """Options of the tracker and of the reference tracking change nothing; a limit of
+    """Options of the reference tracking change nothing; a limit of
     multiply-accumulates is refused (test_reconstructor)."""
     frames = session().frames_v[:2]
     plain, tracked = (Reconstructor(prebuilt()[0], engine="numpy") for _ in range(2))
-    tracked.set_options(track_confirm=3, track_hold=2, track_smooth=0.7, reference_frames=2)
+    tracked.set_options(reference_frames=2)
     for one in (plain, tracked):
         one.tare(session().untouched_v)
     for frame in frames:

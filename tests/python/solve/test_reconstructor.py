@@ -236,9 +236,7 @@ BAD_OPTIONS = [
     ({"touch_radius_weight": None}, "touch_radius_weight"),
     ({"touch_sweeps": 1001}, "touch_sweeps"),
     ({"follow_mm": -1.0}, "follow_mm"),
-    ({"track_confirm": 1001}, "track_confirm = 1001 is out of range; use 0 to 1000"),
-    ({"track_hold": 1001}, "track_hold"),
-    ({"track_smooth": float("nan")}, "track_smooth"),
+    ({"touch_sweeps": 1001}, "touch_sweeps = 1001 is out of range; use 0 to 1000"),
     ({"regularisation_noise_factor": -0.5}, "regularisation_noise_factor"),
     ({"row_gains": 2}, "row_gains"),
     ({"touch_test": -1}, "touch_test"),
@@ -279,7 +277,6 @@ EDGES = {
     "touch_min_fraction": 1.0,
     "touch_min_radius_mm": 2e-6, "touch_max_radius_mm": 1e29, "touch_sweeps": 1000,
     "follow_mm": 0.0, "lambda_abs": 1e29,
-    "track_confirm": 1000, "track_hold": 1000, "track_smooth": 1e29,
     "regularisation_noise_factor": 0.0,
     "touch_fit": 7, "second_pass": True,
 }  # fmt: skip

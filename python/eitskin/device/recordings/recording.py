@@ -27,6 +27,8 @@ FORMAT = "eits"
 VERSION = 1
 CHUNK = 1 << 16
 MAX_HEAD = 4096
+# recordings of versions with a whole-frame tracker note them
+FORMER_OPTIONS = ("track_confirm", "track_hold", "track_smooth")
 LOOKED_THROUGH = 64 * CHUNK  # the note of the solver is among the first packets
 
 
@@ -233,7 +235,8 @@ def recorded_options(path: str | Path) -> Options | None:
     for note in _notes(path):
         if "solver" in note:
             try:
-                options = Options(**note["solver"])
+                noted = {k: v for k, v in note["solver"].items() if k not in FORMER_OPTIONS}
+                options = Options(**noted)
                 check_options(options)
             except (TypeError, EitskinError) as error:
                 raise FileError(

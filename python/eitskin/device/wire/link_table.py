@@ -478,8 +478,6 @@ class Solver(Command, c="eits_command_solver", kind=PacketType.SOLVER):
     solver: U32  # eits_solver: 0 FISTA, 1 working set, 3 active set; 2 is reserved and rejected
     mac_limit: U32  # multiply-accumulates a frame; 0: no limit
     diagnostics: U32  # bits of eits_diagnostic that are looked for
-    # 1: touches are followed in time (eits_options_track), as after a start; 0: they are not
-    track: U32
 
 
 @dataclass(frozen=True)

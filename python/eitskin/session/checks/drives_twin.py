@@ -9,7 +9,6 @@ from math import ceil
 import numpy as np
 
 from eitskin.core.diagnostics_table import Touch
-from eitskin.core.engine import CoreEngine
 from eitskin.core.fast import AlignedFrame, FastCore, FastTouch
 from eitskin.core.results import Reconstruction
 from eitskin.device.wire.link_table import DriveTouch, RawFlags
@@ -21,16 +20,15 @@ Numbers = tuple[bytes, ...]
 
 
 class DrivesTwin:
-    """The fast path beside the ``engine`` whose reference a tare has set. ``same`` and
-    ``different`` count drives that were compared: all of a frame since the board began."""
+    """The tracker ``fast`` of an engine whose reference a tare has set. ``same`` and ``different``
+    count drives that were compared: all of a frame since the board began."""
 
-    def __init__(self, engine: CoreEngine, protocol: Protocol, board: BoardInfo) -> None:
-        self._fast, self._board = FastCore(engine), board
+    def __init__(self, fast: FastCore, protocol: Protocol, board: BoardInfo) -> None:
+        self._fast, self._board = fast, board
         self._drives = _in_order(self._fast, protocol)
         self._reported: dict[int, dict[int, Numbers]] = defaultdict(dict)
         self._next: int | None = None
         self._found: Sequence[Touch] | None = None
-        self._before: Sequence[Touch] = ()
         self.compares = False  # reports after drives were asked for
         self.same = self.different = 0
 
@@ -48,7 +46,7 @@ class DrivesTwin:
         frames are missing here."""
         reported = self._reported.pop(raw.frame, {})
         if raw.flags & RawFlags.BEGUN:
-            self._next, self._found, self._before = raw.frame, None, ()
+            self._next, self._found = raw.frame, None
             try:
                 self._fast.begin()
             except FrameError:
@@ -76,14 +74,13 @@ class DrivesTwin:
         """Keep the touches that the solver found in the last frame, which the drives of the next
         one take into account; return the result with the touches and the diagnostics that are
         reported."""
-        found = tuple(touch for touch in result.touches if touch.explained > 0)
-        touches = self._fast.report(found, self._before)
-        self._found = self._before = found
-        return replace(result, touches=touches, info=self._fast.named(result.info))
+        self._found = result.touches
+        reported = self._fast.followed(result)
+        return replace(reported, info=self._fast.named(reported.info))
 
     def followed(self) -> tuple[Touch, ...]:
         """The touches of the last frame where it was not solved."""
-        return self._fast.report((), ())
+        return self._fast.report(None)
 
     def _drives_at(self, time_us: int) -> list[tuple[int, int]]:
         """Drives of a scan that began at ``time_us``, and their middles by the board's clock."""

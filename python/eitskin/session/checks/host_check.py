@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from eitskin.arrays import AnyArray
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
-from eitskin.core.fast import AlignedFrame
+from eitskin.core.fast import AlignedFrame, FastCore
 from eitskin.core.gestures import Gestures, event_numbers
 from eitskin.core.results import Info, Options, Reconstruction
 from eitskin.device.client import Device
@@ -84,10 +84,12 @@ class HostTwin:
 
     def __init__(self, known: KnownModel, options: Options, board: BoardInfo | None = None) -> None:
         self._core = Reconstructor(known.model, blob=known.blob, options=options)
+        assert self._core.c_engine is not None
+        self._fast = FastCore(self._core.c_engine)
         self._drives: DrivesTwin | None = None
-        self._board, self._protocol = board, known.model.protocol
+        if board is not None:
+            self._drives = DrivesTwin(self._fast, known.model.protocol, board)
         self._from_before = options.warm_start or options.reference_frames > 0
-        self._tracks = options.tracks
         self._untouched: list[RawFrame] = []
         self._tared = self._sure = self._lost = self._events_known = False
         self._gestures = Gestures()
@@ -113,15 +115,8 @@ class HostTwin:
 
     def hear(self, packet: DriveTouches) -> None:
         """Touches after a drive; their frame comes later."""
-        twin = self._drives_twin()
-        if twin is not None:
-            twin.hear(packet)
-
-    def _drives_twin(self) -> DrivesTwin | None:
-        engine = self._core.c_engine
-        if self._drives is None and self._board is not None and engine is not None:
-            self._drives = DrivesTwin(engine, self._protocol, self._board)
-        return self._drives
+        if self._drives is not None:
+            self._drives.hear(packet)
 
     def take(self, frame: Frame) -> Reconstruction | None:
         """The next frame; returns what this host makes of it, None where the board solved
@@ -150,7 +145,7 @@ class HostTwin:
 
     def _drive(self, raw: RawFrame | None) -> AlignedFrame | None:
         """The drives of a frame that the board aligned; None where some are missing here."""
-        twin = self._drives_twin()
+        twin = self._drives
         if twin is None or raw is None or not self._tared:
             return None
         aligned = twin.take(raw)
@@ -171,6 +166,7 @@ class HostTwin:
             self._tared = False
             return
         self._core.forget()
+        self._fast.forget()
         self._gestures.reset()
         self._tared = self._sure = self._events_known = True
 
@@ -178,20 +174,21 @@ class HostTwin:
         """A frame that was not solved has the touches that drives follow."""
         assert self._drives is not None
         touched = not frame.has_touches or same_touches(self._drives.followed(), frame.touches)
-        self._count(frame, self._same_events(frame) and touched, 1.0, self._tracks)
+        self._count(frame, self._same_events(frame) and touched, 1.0, from_before=True)
 
     def _compare(
         self, frame: Frame, raw: RawFrame, aligned: AnyArray | None
     ) -> Reconstruction | None:
-        aligned_here = self._drives is not None and aligned is not None
         volts = raw.voltage_v if aligned is None else aligned
         try:
-            result = self._core.reconstruct(volts, touches=aligned_here or frame.has_touches)
+            result = self._core.reconstruct(volts, touches=aligned is not None or frame.has_touches)
         except FrameError:
             self._count(frame, frame.refused is not None, 1.0, self._from_before)
             return None
         if self._drives is not None and aligned is not None:
             result = self._drives.found(result)
+        elif frame.has_touches:
+            result = self._fast.followed(result)
         assert frame.info is not None
         options, difference = self._core.options, 1.0
         same = frame.refused is None and same_diagnostics(result.info, raw, frame.info, options)
@@ -200,7 +197,7 @@ class HostTwin:
             difference = _difference(result.solver_image, frame.solver_image)
         touched = not frame.has_touches or same_touches(result.touches, frame.touches)
         touched = self._same_events(frame) and touched
-        from_before = self._from_before or (same and not touched and self._tracks)
+        from_before = self._from_before or (same and not touched)
         self._count(frame, same and touched, difference, from_before)
         return result
 

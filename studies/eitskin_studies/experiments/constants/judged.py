@@ -3,7 +3,7 @@ judged."""
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from typing import Any, Protocol, TypeAlias
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from eitskin.arrays import BoolArray, FloatArray
 from eitskin.core.engine import CoreEngine
+from eitskin.core.fast import FastCore
 from eitskin.core.options_table import CHOICES
 from eitskin.core.results import Info, Reconstruction
 from eitskin.errors import EitskinError, FrameError
@@ -153,29 +154,17 @@ def solved(engine: CoreEngine, scene: FrameScene) -> list[Solved]:
     except FrameError as error:
         return [error] * len(scene.frames_v)
     engine.forget()
+    tracker = FastCore(engine)
     results: list[Solved] = []
     for frame in scene.frames_v:
         if not scene.stream:
             engine.forget()
         try:
-            results.append(engine.reconstruct(frame))
+            result = engine.reconstruct(frame)
+            results.append(tracker.followed(result) if scene.stream else result)
         except FrameError as error:
             results.append(error)
-    return _from_one(results)
-
-
-def _from_one(results: list[Solved]) -> list[Solved]:
-    """With ids that count from 1 on, whatever the core had found before this scene."""
-    some = [one for one in results if not isinstance(one, FrameError) and one.touches]
-    first = min((touch.id for one in some for touch in one.touches), default=1)
-    if first == 1:
-        return results
-    return [
-        one if isinstance(one, FrameError) or not one.touches else replace(
-            one, touches=tuple(replace(t, id=t.id - first + 1) for t in one.touches)
-        )
-        for one in results
-    ]  # fmt: skip
+    return results
 
 
 def _set_options(engine: CoreEngine, scene: FrameScene) -> None:

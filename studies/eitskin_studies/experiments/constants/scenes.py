@@ -31,12 +31,12 @@ from eitskin_studies.benchmarks.diagnostics_scenes import (
     drawn,
 )
 from eitskin_studies.experiments.constants.judged import FrameScene
-from eitskin_studies.experiments.experiment import Workspace
-from eitskin_studies.experiments.tracking.streams import (
+from eitskin_studies.experiments.constants.streams import (
     TouchStream,
     passing_streams,
     random_streams,
 )
+from eitskin_studies.experiments.experiment import Workspace
 from eitskin_studies.harness.discs import spaced_touches
 from eitskin_studies.harness.sessions import converter_for, copied
 from eitskin_studies.harness.snr import noise_deviation_v
