@@ -267,6 +267,7 @@ class PageCommands:
         place = _free(folder) if begun is None else begun
         done = robot.begin_recording(place, self._failed) if on else robot.end_recording()
         answer: Future[str] = Future()
+        answer.set_running_or_notify_cancel()  # a page that goes does not stop it
 
         def answered(result: "Future[Any]") -> None:
             self._reader.report("setup", {})

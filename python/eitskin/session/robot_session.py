@@ -466,7 +466,14 @@ class RobotSession:
     def end_recording(self) -> "Future[Any]":
         """End what ``begin_recording`` began, and say in ``robot.toml`` when each skin began."""
         done = self._ask_each(lambda skin: skin.end_recording())
-        done.add_done_callback(lambda _: self._write_recorded())
+
+        def write(_: "Future[Any]") -> None:
+            try:
+                self._write_recorded()
+            except FileError as error:
+                self.say(str(error))
+
+        done.add_done_callback(write)
         return done
 
     def _ask_each(self, action: Callable[[RobotSkinSession], None]) -> "Future[Any]":
@@ -568,8 +575,9 @@ def _time_us(one: RobotSkinSession) -> int:
 
 def all_of(answers: dict[str, "Future[Any]"]) -> "Future[Any]":
     """The first skin's answer once those of all skins are there, or the first error, with the
-    skin's name."""
+    skin's name. It cannot be cancelled."""
     answer: Future[Any] = Future()
+    answer.set_running_or_notify_cancel()
     lock, left = threading.Lock(), [len(answers)]
 
     def done(_: "Future[Any]") -> None:
