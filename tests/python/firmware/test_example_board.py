@@ -47,7 +47,7 @@ def ring_v(rows: np.ndarray, pressed: bool) -> np.ndarray:
 def board(image: Path, machine: str) -> Iterator[Device]:
     """QEMU with the image, its UART on a pseudo-terminal."""
     command = ["qemu-system-arm", "-M", machine, "-display", "none", "-monitor", "none"]
-    command += ["-icount", "shift=6", "-serial", "pty", "-kernel", str(image)]
+    command += ["-icount", "shift=6,sleep=off", "-serial", "pty", "-kernel", str(image)]
     emulator = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
@@ -82,6 +82,7 @@ def check(image: Path, machine: str) -> None:
                 pressed += far(frame.raw, frames[0])
                 if pressed == 2 or time.monotonic() > until:  # the first may be of both
                     break
+        assert device.stats().slots_repeated == 0
     rows = model.protocol.drive_measure
     for raw, is_pressed in ((frames[0], False), (frames[-1], True)):
         assert not (raw.quality & ~np.uint8(Quality.RECIPROCITY)).any()
