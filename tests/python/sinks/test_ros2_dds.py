@@ -153,7 +153,7 @@ def test_fast_dds_receives_what_is_streamed(reader, store, tmp_path):
         assert len(read) > 20, (name, said)
     contacts = [store.deserialize_cdr(one, CONTACTS) for one in found["rt/left/contacts"]]
     assert all(one.header.frame_id == "left" for one in contacts)
-    assert any(one.contacts and abs(one.contacts[0].x) < 0.1 for one in contacts)
+    assert any(one.contacts and abs(one.contacts[0].position.x) < 0.1 for one in contacts)
 
 
 class Tares:
