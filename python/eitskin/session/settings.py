@@ -92,7 +92,7 @@ class SessionSettings:
         say(settings_text(point, preset.board))
         one = point.configuration
         kept = {k: value for k, value in one.solver_settings.items() if k in board_takes()}
-        own = {key: getattr(named, key) for key in ("sign", "warm_start", "diagnostics", "track")}
+        own = {key: getattr(named, key) for key in ("sign", "warm_start", "diagnostics")}
         if any_scan:
             check_every = 1 if one.scan == "full" else 0
             scan = replace(scan, samples=one.samples, check_every=check_every)
