@@ -38,7 +38,11 @@ def test_every_set_is_scored_and_the_worst_come_first(done):
     assert load("other-worlds") is other_worlds
     outcome = done[1]
     assert [one["name"] for one in outcome.data["scores"]] == list(WORLDS)
-    fails, ellipses, holds, headline = outcome.tables
+    images, fails, ellipses, holds, headline = outcome.tables
+    with_touches = [one for one in outcome.data["scores"] if one["images"] is not None]
+    assert [row[0] for row in images.rows] == [f"`{one['name']}`" for one in with_touches]
+    assert len(with_touches) == sum(not name.startswith("no_touch") for name in WORLDS)
+    assert all(0 < one["images"]["solver"]["mean"] <= 1 for one in with_touches)
     assert [row[0] for row in ellipses.rows[:2]] == ["`ellipses`", "`fingers`"]
     shares = [float(row[1].split(" %")[0]) for row in fails.rows]
     assert shares == sorted(shares) and max(shares) < 90

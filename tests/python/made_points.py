@@ -19,6 +19,7 @@ def point(name: str, accuracy: float, instructions: float, **more: Any) -> Opera
     score = {
         "scenes": 9,
         "image": {"mean": accuracy, **spread},
+        "drawn": {"mean": 0.93},
         "discs": {"mean": 0.9, "worst_tenth": 0.8, "low": 0.88, "high": 0.91},
         "exact_count": 1.0,
         "position_mm": {"median": 0.5, "p95": 1.0},

@@ -1,5 +1,6 @@
 """The inputs and results of a reconstruction, for every engine."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
@@ -113,6 +114,11 @@ class LearnedReference:
     noise_v: float
     lambda_noise: float
     outliers: int = 0
+
+    @property
+    def snr_db(self) -> float | None:
+        """The SNR of a frame, 20 log10(v0_rms_v / noise_v), or None if the noise is not known."""
+        return 20 * math.log10(self.v0_rms_v / self.noise_v) if self.noise_v > 0 else None
 
 
 NEWTONS_PER_GRAM = 9.80665e-3  # of a weight, at the standard acceleration of gravity

@@ -132,8 +132,9 @@ def reconstruct_frames(
     frames, chosen = read(path, how.only)
     reconstructor, blob, name = choose_model(path, frames, how)
     know_converter(reconstructor, frames)
-    point = apply_options(reconstructor, frames, how, notes)
+    apply_options(reconstructor, frames, how)
     reference = take_reference(path, reconstructor, frames, notes)
+    point = apply_preset(reconstructor, how, reference, notes)
     results, refused = solve(reconstructor, blob, frames, chosen, how, progress)
     scores = score(reconstructor.model, frames, results, reconstructor.options.sign, point, notes)
     several = sum(bool(one.touches) for one in results.values()) > 1
@@ -203,20 +204,28 @@ def know_converter(reconstructor: Reconstructor, frames: Frames) -> None:
         reconstructor.set_options(noise_floor_v=step_v / math.sqrt(12))
 
 
-def apply_options(
-    reconstructor: Reconstructor, frames: Frames, how: ReconstructSettings, notes: list[str]
-) -> OperatingPoint | None:
-    """Set the solver's options; with a preset, set and return the operating point that fulfils
-    it."""
+def apply_options(reconstructor: Reconstructor, frames: Frames, how: ReconstructSettings) -> None:
+    """Set the solver's options that are named."""
     reconstructor.set_options(**how.changes)
     if how.tracked(frames):
         reconstructor.set_options(tracking(reconstructor.options))
+
+
+def apply_preset(
+    reconstructor: Reconstructor,
+    how: ReconstructSettings,
+    reference: LearnedReference,
+    notes: list[str],
+) -> OperatingPoint | None:
+    """If a preset is named, set and return the operating point that fulfils it at the SNR that the
+    tare measured."""
     if how.preset is None:
         return None
 
-    point = operating_point_for(how.preset, reconstructor.model, reconstructor.options)
+    preset = how.preset.at_snr(reference.snr_db)
+    point = operating_point_for(preset, reconstructor.model, reconstructor.options)
     reconstructor.set_options(**point.configuration.solver_settings)
-    notes.append(settings_text(point, how.preset.board))
+    notes.append(settings_text(point, preset))
     return point
 
 
@@ -261,7 +270,7 @@ def solve(
         batch.tare(frames.reference_voltage_v)
         solved = batch.each(frames.voltage_v[chosen])
     else:
-        solved = _one_by_one(reconstructor, frames, chosen, how)
+        solved = _one_by_one(reconstructor, frames.voltage_v[chosen], how.tracked(frames), how.warm)
     results: Results = {}
     refused: dict[int, str] = {}
     for number, result in zip(chosen, progress(solved, len(chosen)), strict=True):
@@ -273,17 +282,13 @@ def solve(
 
 
 def _one_by_one(
-    reconstructor: Reconstructor, frames: Frames, chosen: list[int], how: ReconstructSettings
+    reconstructor: Reconstructor, frames_v: Any, tracked: bool, warm: bool
 ) -> Iterator[Reconstruction | FrameError]:
-    tracked = how.tracked(frames)
-    for k in chosen:
-        if not (tracked or how.warm):
+    for frame_v in frames_v:
+        if not (tracked or warm):
             reconstructor.forget()
         try:
-            if tracked:
-                yield reconstructor.follow(frames.voltage_v[k], frames.row_times_s(k))
-            else:
-                yield reconstructor.reconstruct(frames.voltage_v[k])
+            yield reconstructor.follow(frame_v) if tracked else reconstructor.reconstruct(frame_v)
         except FrameError as error:
             yield error
 

@@ -89,7 +89,7 @@ class SessionSettings:
         any_scan = preset.unit == REPORT_US
         now = named.applied(known.model, board)
         point = operating_point_for(preset, known.model, now, board_takes(), any_scan)
-        say(settings_text(point, preset.board))
+        say(settings_text(point, preset))
         one = point.configuration
         kept = {k: value for k, value in one.solver_settings.items() if k in board_takes()}
         own = {key: getattr(named, key) for key in ("sign", "warm_start", "diagnostics")}

@@ -36,6 +36,8 @@ class Configuration:
             ``mac_limit`` multiply-accumulates (0: no limit).
         lambda_rel: least lambda over lambda_max; a value below the lambda that the noise requires
             has no effect.
+        lambda_noise_factor: least lambda over lambda_noise, which the tare measures, so that the
+            image of a noisy instrument is smoothed more. It cannot be set over a board's link.
         warm_start: each frame starts from the last one's image. It is scored at the fourth frame of
             touches that are held, after other touches: what a user sees of resting touches, not of
             new ones.
@@ -62,6 +64,7 @@ class Configuration:
     gap: float = parameter(0.0, low=0, high=1)
     mac_limit: int = parameter(0, low=0, high=2**62)
     lambda_rel: float = parameter(Defaults.lambda_rel, low=0, high=1)
+    lambda_noise_factor: float = parameter(Defaults.lambda_noise_factor, low=0, high=1000)
     warm_start: bool = False
     touch_sweeps: int = parameter(6, low=0, high=1000)
     samples: int = parameter(BASE_SAMPLES, low=PERIOD_SAMPLES, high=1020)
@@ -95,6 +98,7 @@ class Configuration:
             "iterations": self.iterations,
             "gap_rel": self.gap,
             "lambda_rel": self.lambda_rel,
+            "lambda_noise_factor": self.lambda_noise_factor,
             "warm_start": self.warm_start,
             "touch_sweeps": self.touch_sweeps,
             "touch_fit": self.touch_fit,
@@ -143,6 +147,7 @@ def build_settings(
         solver=one.solver,
         iterations=one.iterations,
         lambda_rel=one.lambda_rel,
+        lambda_noise_factor=one.lambda_noise_factor,
         touch_fit_left_out=left_out,
     )
     if mask_threshold is not None:

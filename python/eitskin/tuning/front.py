@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -22,16 +22,23 @@ from eitskin.tuning.report_time import report_us
 FORMAT, VERSION = "eitskin-tradeoff", 1
 SHIPPED = "front.json"
 F767_MHZ = 216
-F767_RAM = 256 * 1024  # the linker script reserves this much for the workspace
+F767_RAM = 368 * 1024  # of 384 kB for the workspace; the rest is for frames
+MEASURED_DB = (40.0, 60.0, 80.0)  # the SNRs of the shipped results
 DEFAULT_PERIOD_US = 20_800  # duration of the default scan
 REPORT_US = "report_us"
 MIN_SWEEPS = Configuration.touch_sweeps  # fewer sweeps save little, and make discs worse
 MEASURED = ("threshold", "force_scale", "costs", "instructions", "host_us")
 SHORT_CELL = (
-    "image.mean", "image.low", "image.high", "image.worst_tenth", "discs.mean", "exact_count",
-    "solve_macs", "touch_macs", "most_macs",
+    "image.mean", "image.low", "image.high", "image.worst_tenth", "drawn.mean", "discs.mean",
+    "exact_count", "solve_macs", "touch_macs", "most_macs",
 )  # fmt: skip
-MODEL_HOLDS = {"solver", "iterations", "lambda_rel", "touch_fit"}  # stored in a model
+MODEL_HOLDS = {
+    "solver",
+    "iterations",
+    "lambda_rel",
+    "lambda_noise_factor",
+    "touch_fit",
+}  # stored in a model
 
 
 @dataclass(frozen=True)
@@ -162,8 +169,8 @@ def board_takes() -> set[str]:
 
 @dataclass(frozen=True)
 class Conditions:
-    """The conditions of an accuracy: the scenes, the SNR, and whether images or discs are
-    scored."""
+    """The conditions of an accuracy: the scenes, the SNR, and what is scored: the solver's
+    "image", the "drawn" image that is shown, or touches as "discs"."""
 
     scenes: str = "random"
     snr_db: float = 60.0
@@ -190,7 +197,7 @@ def _cell(cell: Any) -> dict[str, Any]:
     scores: dict[str, Any] = {}
     for name, value in zip(SHORT_CELL, cell, strict=True):
         group, _, part = name.partition(".")
-        if group in ("image", "discs"):
+        if group in ("image", "drawn", "discs"):
             scores.setdefault(group, {})[part] = value
         else:
             scores[group] = [value] if group in ("solve_macs", "touch_macs") else value
@@ -250,7 +257,8 @@ class Preset:
     The cost is at most ``limit``, for the mean frame or the ``worst``, and the accuracy is at least
     ``accuracy``, on ``board`` under the conditions ``where``; a frame is measured within
     ``period_us``. Without a limit, costs are compared in the unit ``compared_in``. ``name`` is
-    empty unless it is a named preset.
+    empty unless it is a named preset. ``snr_known`` says that ``where`` has the SNR of the user's
+    instrument.
     """
 
     limit: Limit | None
@@ -261,11 +269,20 @@ class Preset:
     worst: bool = False
     compared_in: str = "us"
     name: str = ""
+    snr_known: bool = False
 
     @property
     def unit(self) -> str:
         """The unit in which costs are compared."""
         return self.compared_in if self.limit is None else self.limit.unit
+
+    def at_snr(self, snr_db: float | None) -> Preset:
+        """Return the same preset for an instrument with the SNR ``snr_db``: its conditions are the
+        nearest of ``MEASURED_DB``. None leaves it as it is."""
+        if snr_db is None:
+            return self
+        nearest_db = min(MEASURED_DB, key=lambda one: (abs(one - snr_db), one))
+        return replace(self, where=replace(self.where, snr_db=nearest_db), snr_known=True)
 
     @property
     def acquisition_us(self) -> float:
@@ -279,14 +296,19 @@ class Preset:
 
 
 # "fast" has the earliest report with the paper's accuracy of .84, "balanced" is the most accurate
-# with a report within 45 ms of contact, and "accurate" is the most accurate of all.
+# with a report within 45 ms of contact, and "accurate" is the most accurate of all. The last two
+# are at least as accurate as the defaults (``no_worse``).
 PRESET_ACCURACY = {"fast": 0.84}
 PRESET_REPORT_MS = {"balanced": 45.0, "accurate": 1e6}
 PRESETS = (*PRESET_ACCURACY, *PRESET_REPORT_MS)
+IMAGES = ("image", "drawn")
 
 
-def named_preset(name: str, board: str, where: Conditions | None = None) -> Preset:
-    """Return the preset ``name`` for ``board``.
+def named_preset(
+    name: str, board: str, where: Conditions | None = None, snr_db: float | None = None
+) -> Preset:
+    """Return the preset ``name`` for ``board``. ``snr_db`` is the measured SNR, or None if it is
+    not known.
 
     Raises:
         UsageError: there is no such preset.
@@ -297,7 +319,7 @@ def named_preset(name: str, board: str, where: Conditions | None = None) -> Pres
     limit = None if ms is None else Limit(1000 * ms, REPORT_US)
     accuracy = PRESET_ACCURACY.get(name)
     place = where or Conditions()
-    return Preset(limit, accuracy, board, place, compared_in=REPORT_US, name=name)
+    return Preset(limit, accuracy, board, place, compared_in=REPORT_US, name=name).at_snr(snr_db)
 
 
 def checked_preset(preset: Preset) -> Preset:
@@ -318,18 +340,49 @@ def checked_preset(preset: Preset) -> Preset:
     return preset
 
 
+def no_worse(
+    points: Iterable[OperatingPoint], default: OperatingPoint, preset: Preset
+) -> list[OperatingPoint]:
+    """Return the points whose images, the solver's and the one that is shown, are on average at
+    least as accurate as those of the ``default`` settings: at the SNR of ``preset`` if it is that
+    of the user's instrument, otherwise at each of ``MEASURED_DB``."""
+    snrs_db = (preset.where.snr_db,) if preset.snr_known else MEASURED_DB
+    places = [
+        replace(preset.where, snr_db=snr_db, judged=judged)
+        for snr_db in snrs_db
+        for judged in IMAGES
+    ]
+    least = [(place, default.accuracy(place)) for place in places]
+    return [
+        one
+        for one in points
+        if all(known is None or (one.accuracy(place) or 0.0) >= known for place, known in least)
+    ]
+
+
+def default_point(points: Iterable[OperatingPoint]) -> OperatingPoint | None:
+    """Return the point with the default settings, or None if it is not among ``points``."""
+    return next((p for p in points if replace(p.configuration, name="") == Configuration("")), None)
+
+
 def choose(
-    points: Iterable[OperatingPoint], preset: Preset, what: str = "operating point"
+    points: Iterable[OperatingPoint],
+    preset: Preset,
+    what: str = "operating point",
+    default: OperatingPoint | None = None,
 ) -> OperatingPoint:
     """Return the most accurate point within the limit if there is a limit, the cheapest point that
     reaches the accuracy if there is an accuracy, and the cheapest that does both if there are both.
 
-    Points with fewer sweeps of the touch fit than the default are left out. ``what`` names the
-    points in errors.
+    Points with fewer sweeps of the touch fit than the default are left out. The presets "balanced"
+    and "accurate" also leave out those that are less accurate than the ``default`` settings
+    (``no_worse``). ``what`` names the points in errors.
 
     Raises:
         UsageError: no point fulfils the preset.
     """
+    if default is not None and preset.name in PRESET_REPORT_MS:
+        points = no_worse(points, default, preset)
     known = []
     for one in points:
         cost = one.cost(preset.unit, preset.board, preset.where, preset.worst)

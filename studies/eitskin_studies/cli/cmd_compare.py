@@ -46,6 +46,13 @@ def add_parser(subparsers: Any) -> None:
         "--methods WORDS",
         "only methods with one of these words in their names, such as eitskin,noser",
     )
+    option(
+        parser,
+        "--learned FOLDER",
+        "also a small network that is trained on this dataset (eitskin dataset; needs"
+        " scikit-learn)",
+        Path,
+    )
     option(parser, "--threads N", "of the C core's frames", default=1)
     option(parser, "--json", "print JSON, with the curves over the threshold")
     option(parser, "--csv FILE", "write the numbers of every scene", Output)
@@ -85,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
         skin,
         protocol,
         settings,
-        families=partial(methods, threads=options.threads),
+        families=partial(methods, threads=options.threads, dataset=options.learned),
         only=[word.strip() for word in (options.methods or "").split(",") if word.strip()],
         progress=named_bar,
     )
@@ -109,6 +116,8 @@ def _check(options: argparse.Namespace) -> None:
     if not -20 <= options.snr_db <= 200:
         raise UsageError(f"--snr-db {options.snr_db:g} is out of range; use -20 to 200")
     check_threads(options.threads)
+    if options.learned is not None and not options.learned.is_dir():
+        raise FileError(f"--learned {options.learned}: no such folder; run  eitskin dataset")
     if options.seed < 0:
         raise UsageError(f"--seed {options.seed} must be 0 or above")
     for path in (options.csv, options.picture, options.curves):

@@ -1,4 +1,4 @@
-"""``eitskin draw effect | touch | wiring | live | examples``: the documentation's pictures."""
+"""``eitskin draw WHAT``: the documentation's pictures."""
 
 import argparse
 from pathlib import Path
@@ -22,6 +22,9 @@ def add_parser(subparsers: Any) -> None:
     option(touch, "name NAME", "of the law or shape (docs/guide/scenes.md)")
     option(touch, "-o --output PNG", None, Path, required=True)
     touch.set_defaults(run=run_touch)
+    miou = what.add_parser("miou", help="what MIoU measures, and images at .75, .85 and .95")
+    option(miou, "-o --output PNG", None, Path, required=True)
+    miou.set_defaults(run=run_miou)
     wiring = what.add_parser("wiring", help="the wiring of board, multiplexers and skin")
     option(wiring, "-o --output PNG", None, Path, required=True)
     wiring.set_defaults(run=run_wiring)
@@ -52,6 +55,18 @@ def run_touch(options: argparse.Namespace) -> int:
 
     refuse_unwritable(options.output)
     draw_touch(options.output, options.name)
+    print(f"picture: {options.output}")
+    return 0
+
+
+def run_miou(options: argparse.Namespace) -> int:
+    """Draw what MIoU measures."""
+    from eitskin.cli.progress import named_bar
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.pictures.miou_picture import draw_miou
+
+    refuse_unwritable(options.output)
+    draw_miou(options.output, named_bar)
     print(f"picture: {options.output}")
     return 0
 

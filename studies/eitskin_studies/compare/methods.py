@@ -2,6 +2,7 @@
 
 from importlib.metadata import entry_points
 from importlib.util import find_spec
+from pathlib import Path
 
 from eitskin.arrays import FloatArray
 from eitskin.errors import UsageError
@@ -10,6 +11,7 @@ from eitskin_studies.compare import baselines
 from eitskin_studies.compare.core_method import core_methods
 from eitskin_studies.compare.families import Family, Setup
 from eitskin_studies.compare.greit import train_greit
+from eitskin_studies.compare.learned import learned_family
 from eitskin_studies.compare.pyeit_method import pyeit_method
 
 ENTRY_POINT_GROUP = "eitskin.methods"
@@ -19,9 +21,10 @@ RATIOS = (1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 CONVERGED_RATIOS = (1e-3, 3e-3, 1e-2)  # 3,000 iterations take ten times as long as 300
 
 
-def methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
+def methods(setup: Setup, threads: int = 1, dataset: Path | None = None) -> tuple[Family, ...]:
     """All that ``eitskin compare`` compares, in the order of its table; the C core's frames over
-    ``threads``. pyEIT is among them where it is installed.
+    ``threads``. pyEIT is among them where it is installed, a learned method where there is a
+    ``dataset`` to train it on.
 
     Raises:
         UsageError: the C core is not built, or a method of another package cannot be made.
@@ -29,7 +32,9 @@ def methods(setup: Setup, threads: int = 1) -> tuple[Family, ...]:
     classic = baseline_methods(setup.jacobian, setup.grid)
     converged = plain_fista(setup.jacobian, 3000, signed=False, ratios=CONVERGED_RATIOS)
     theirs = (pyeit_method(setup),) if find_spec("pyeit") else ()
-    return (*classic, converged, *theirs, *own_methods(setup), *core_methods(setup, threads))
+    learned = () if dataset is None else (learned_family(setup, dataset),)
+    others = (*classic, converged, *theirs, *learned, *own_methods(setup))
+    return (*others, *core_methods(setup, threads))
 
 
 def own_methods(setup: Setup) -> tuple[Family, ...]:

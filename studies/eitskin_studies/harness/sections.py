@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 from eitskin.config import check_keys, load_toml, nearest
 from eitskin.errors import ConfigError
 from eitskin.fileio import read_bytes, write_bytes
+from eitskin_studies.harness.numbers import keep_numbers, tables_of
 
 WIDTH = 100
 
@@ -47,7 +48,8 @@ def _read(page: Path) -> str:
 
 def fill_marks(page: Path, name: str, filling: Filling) -> None:
     """Write texts and tables between their marks in ``page``, so that none is ever copied by hand;
-    of the tables what ``pages.toml`` says of the page ``name``, and its sentences about them.
+    of the tables what ``pages.toml`` says of the page ``name``, and its sentences about them. What
+    was written is stored (``numbers.keep_numbers``).
 
     Raises:
         FileError: the page cannot be read or written.
@@ -66,20 +68,55 @@ def fill_marks(page: Path, name: str, filling: Filling) -> None:
         if part.get("page", True):
             contents[mark] = markdown_table(*_part(table, part, f"{PARTS.name}: {name}.{mark}"))
     for mark, content in contents.items():
-        marked = re.compile(
-            f"(<!-- {re.escape(mark)} -->\n).*?(<!-- end {re.escape(mark)} -->)", re.DOTALL
-        )
-        if not marked.search(text):
-            raise ConfigError(
-                f"{page}: has no marks <!-- {mark} --> and <!-- end {mark} -->; add them where the"
-                " text is to be"
-            )
-
-        def filled(match: re.Match[str], content: str = content) -> str:
-            return f"{match.group(1)}{content}\n{match.group(2)}"
-
-        text = marked.sub(filled, text)
+        text = _placed(text, mark, content, page)
     write_bytes(page, text.encode("utf-8"))
+    keep_numbers(page, name, filling)
+
+
+def fill_readme(readme: Path, results: Path) -> None:
+    """Write the README's lines with numbers between their marks: ``pages.toml`` has them under
+    README, with cells {PAGE.TABLE|row|column} of the tables of the pages in ``results``.
+
+    Raises:
+        FileError: the README cannot be read or written.
+        ConfigError: it lacks a mark, or a page lacks a table, row or column.
+    """
+    text, tables = _read(readme), tables_of(results)
+    for mark, part in load_toml(PARTS, "list of what pages show")["README"].items():
+
+        def number(cell: re.Match[str]) -> str:
+            return _number_of(tables, cell[1], cell[2], cell[3])
+
+        text = _placed(text, mark, _CELL.sub(number, part["text"]), readme)
+    write_bytes(readme, text.encode("utf-8"))
+
+
+def _number_of(tables: Mapping[str, Tabular], table: str, row: str, column: str) -> str:
+    """A cell of a page's table; of "a / b" the column "first of NAME" is a."""
+    where, (part, _, name) = f"{PARTS.name}: README", column.rpartition(" of ")
+    if table not in tables:
+        raise ConfigError(f"{where}: no table {table!r}; {nearest(table, tables)}")
+    head, rows = tables[table]
+    if name not in head:
+        raise ConfigError(f"{where}: no column {name!r}; {nearest(name, head)}")
+    found = [one for one in rows if one[0] == row]
+    if len(found) != 1:
+        raise ConfigError(f"{where}: {len(found)} rows of {table} are named {row!r}")
+    cell = found[0][list(head).index(name)]
+    return cell.split(" / ")[("first", "second").index(part)] if part else cell
+
+
+def _placed(text: str, mark: str, content: str, page: Path) -> str:
+    """``text`` of ``page`` with ``content`` between the marks of the name ``mark``."""
+    marked = re.compile(
+        f"(<!-- {re.escape(mark)} -->\n).*?(<!-- end {re.escape(mark)} -->)", re.DOTALL
+    )
+    if not marked.search(text):
+        raise ConfigError(
+            f"{page}: has no marks <!-- {mark} --> and <!-- end {mark} -->; add them where the"
+            " text is to be"
+        )
+    return marked.sub(lambda match: f"{match[1]}{content}\n{match[2]}", text)
 
 
 def _said(sentence: str, tables: Mapping[str, Tabular], where: str) -> str:

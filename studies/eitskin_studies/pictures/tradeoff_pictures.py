@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from eitskin.tuning.front import F767_MHZ, Conditions, Front, OperatingPoint
 from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, STYLE, load_matplotlib
-from eitskin_studies.pictures.report_time_picture import draw_report_time
+from eitskin_studies.pictures.equal_pictures import draw_board, draw_equal, draw_equal_by_noise
 from eitskin_studies.tradeoff.table import best_points, x_of
 
 if TYPE_CHECKING:
@@ -401,7 +401,9 @@ def draw_objective(path: Path, front: Front) -> None:
 
 
 DRAWN = {
-    "report-time.png": draw_report_time,
+    "equal.png": draw_equal,
+    "equal-by-noise.png": draw_equal_by_noise,
+    "board.png": draw_board,
     "front.png": draw_front,
     "knobs.png": draw_knobs,
     "noise.png": draw_noise,

@@ -27,11 +27,12 @@ DIGITS = 6
 
 @dataclass(frozen=True)
 class TrainedPoint:
-    """The choices made on training scenes: ``threshold``, t of the mask x > t max(x), and
-    ``force_scale``, what the strengths of found touches are multiplied by: the median of true over
-    found."""
+    """The choices made on training scenes: ``threshold``, t of the mask x > t max(x) of the
+    solver's image, ``drawn_threshold``, the same of the image that is shown, and ``force_scale``,
+    by which the strengths of found touches are multiplied: the median of true over found."""
 
     threshold: float
+    drawn_threshold: float
     force_scale: float
 
 
@@ -44,8 +45,13 @@ class SolvedSet:
 
     @property
     def images(self) -> FloatArray:
-        """(k, n) S/m."""
+        """The solver's images, (k, n) S/m."""
         return np.array([one.solver_image for one in self.results], dtype=np.float64)
+
+    @property
+    def drawn(self) -> FloatArray:
+        """The images that are shown, (k, n) S/m: of the touches where they explain the frame."""
+        return np.array([one.image for one in self.results], dtype=np.float64)
 
 
 def solve_session(
@@ -76,14 +82,16 @@ def solve_frames(
 
 
 def train(built: Built, session: FrameSession, solved: SolvedSet) -> TrainedPoint:
-    """t with the best mean MIoU, and the scale of force."""
-    curves = miou_curves(
-        built.image_scorer, solved.images, session.truths(built.image_scorer.raster)
+    """For each kind of image t with the best mean MIoU, and the scale of force."""
+    truths = session.truths(built.image_scorer.raster)
+    threshold, drawn_threshold = (
+        best_threshold(miou_curves(built.image_scorer, images, truths))
+        for images in (solved.images, solved.drawn)
     )
     found, true = _forces(session, solved)
     usable = found > 0
     scale = float(np.median(true[usable] / found[usable])) if usable.any() else 1.0
-    return TrainedPoint(best_threshold(curves), round(scale, DIGITS))
+    return TrainedPoint(threshold, drawn_threshold, round(scale, DIGITS))
 
 
 def score(
@@ -93,6 +101,7 @@ def score(
     says what each is."""
     truths = session.truths(built.image_scorer.raster)
     image = miou_curves(built.image_scorer, solved.images, truths, [trained.threshold])[:, 0]
+    drawn = miou_curves(built.image_scorer, solved.drawn, truths, [trained.drawn_threshold])[:, 0]
     discs = [
         metrics.miou(_discs(built, result), truth)
         for result, truth in zip(solved.results, truths, strict=True)
@@ -103,6 +112,7 @@ def score(
     return {
         "scenes": len(matchings),
         "image": _summary(summarise(image)),
+        "drawn": _summary(summarise(drawn)),
         "discs": _summary(summarise(discs)),
         "exact_count": round(float(np.mean([m.exact for m in matchings])), DIGITS),
         "hit_share": round(hits / max(hits + sum(m.misses for m in matchings), 1), DIGITS),

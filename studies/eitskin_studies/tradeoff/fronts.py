@@ -5,20 +5,25 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from eitskin.errors import UsageError
 from eitskin.tuning.configuration import Configuration
 from eitskin.tuning.front import (
     FORMAT,
     MEASURED,
+    PRESETS,
     SHORT_CELL,
     VERSION,
     Front,
     OperatingPoint,
+    choose,
+    default_point,
     load_front,
-)  # fmt: skip
+    named_preset,
+)
 
 RECORDED = Path(__file__).with_name("front.json")
 SCORES = (
-    "scenes", "image", "discs", "exact_count", "position_mm", "force_error", "solve_macs",
+    "scenes", "image", "drawn", "discs", "exact_count", "position_mm", "force_error", "solve_macs",
     "touch_macs", "most_macs",
 )  # fmt: skip
 
@@ -30,6 +35,18 @@ def recorded_front() -> Front:
         FileError, ConfigError: they are missing or damaged.
     """
     return load_front(RECORDED)
+
+
+def chosen_presets(points: Sequence[OperatingPoint], board: str) -> dict[str, OperatingPoint]:
+    """The point of each preset on ``board`` where the SNR is not known; none where no point
+    fulfils it."""
+    found, default = {}, default_point(points)
+    for name in PRESETS:
+        try:
+            found[name] = choose(points, named_preset(name, board), default=default)
+        except UsageError:
+            continue
+    return found
 
 
 def as_dict(front: Front) -> dict[str, Any]:
@@ -51,15 +68,12 @@ def to_json(values: dict[str, Any]) -> str:
 
 
 def kept_cells(front: Front) -> Front:
-    """Return what is recorded: numbers to four decimals, and 60 dB alone of all sets but
-    "random"."""
+    """Return what is recorded: numbers to four decimals."""
     kept = []
     for one in front.points:
         scores = {
             name: {
-                snr: {key: _rounded(score[key]) for key in SCORES}
-                for snr, score in cells.items()
-                if name == "random" or snr == "60"
+                snr: {key: _rounded(score[key]) for key in SCORES} for snr, score in cells.items()
             }
             for name, cells in one.scores.items()
         }
@@ -69,7 +83,8 @@ def kept_cells(front: Front) -> Front:
 
 def in_short(front: Front) -> dict[str, Any]:
     """Return what the package ships of a recorded front: the part that ``recommend`` and
-    ``--preset`` read. Configurations omit the keys that have their default; cells are numbers."""
+    ``--preset`` read. Configurations omit the keys that have their default; cells are numbers;
+    other methods are left out."""
     usual = Configuration("").as_dict()
     points = []
     for one in front.points:
@@ -91,7 +106,8 @@ def in_short(front: Front) -> dict[str, Any]:
                 },
             }
         )
-    return {**as_dict(front), "points": points}
+    settings = {name: value for name, value in front.settings.items() if name != "peers"}
+    return {**as_dict(front), "settings": settings, "points": points}
 
 
 def _only(values: dict[str, Any] | None, names: tuple[str, ...]) -> dict[str, Any] | None:

@@ -1,13 +1,27 @@
 """The tables of studies/results/tradeoff.md, written by the command between the page's marks."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from eitskin.errors import UsageError
 from eitskin.fileio import write_beside
-from eitskin.tuning.front import REPORT_US, Conditions, Front, Limit, OperatingPoint, Preset, choose
+from eitskin.tuning.configuration import Configuration
+from eitskin.tuning.front import (
+    MEASURED_DB,
+    REPORT_US,
+    Conditions,
+    Front,
+    Limit,
+    OperatingPoint,
+    Preset,
+    choose,
+    default_point,
+    named_preset,
+)
 from eitskin_studies.harness.sections import Tabular, fill_marks
-from eitskin_studies.pictures.report_time_picture import chosen_presets
+from eitskin_studies.tradeoff.equal import equal_table, scan_table, verdict
+from eitskin_studies.tradeoff.fronts import chosen_presets
 from eitskin_studies.tradeoff.table import best_points
 
 PICTURES = "pictures/tradeoff"
@@ -40,8 +54,15 @@ PRESET_HEAD = (
     "scan, ms",
     "solve, ms, mean / most",
     "contact to report, ms",
-    "image MIoU (95 %)",
-    "exact",
+    "solver's image, 40 / 60 / 80 dB",
+    "image shown, 40 / 60 / 80 dB",
+)
+FOLLOWED_HEAD = (
+    "SNR by the tare",
+    "point",
+    "solve and touches, ms, mean / most",
+    "solver's image: accurate / default",
+    "image shown: accurate / default",
 )
 RECOMMENDED_HEAD = (
     "budget",
@@ -91,23 +112,59 @@ def preset_table(front: Front) -> Tabular:
     points = [one for one in front.points if not one.configuration.warm_start]
     rows = []
     for board in ("f767", "host"):
+        rows.append(_preset_row("default", default_point(points), board))
         for name, point in chosen_presets(points, board).items():
-            one, score = point.configuration, point.score(Conditions())
-            report = point.cost(REPORT_US, board, Conditions())
-            assert score is not None and report is not None
-            image = score["image"]
-            rows.append(
-                (
-                    f"{name}, {'board' if board == 'f767' else 'host'}",
-                    point.name,
-                    f"{one.scan}, {one.samples} samples, {point.costs['acquisition_us'] / 1e3:.1f}",
-                    _times(point, board),
-                    f"{report / 1e3:.0f}",
-                    f"{_share(image['mean'])} ({_share(image['low'])} to {_share(image['high'])})",
-                    f"{100 * score['exact_count']:.0f} %",
-                )
-            )
+            rows.append(_preset_row(name, point, board))
     return PRESET_HEAD, rows
+
+
+def followed_table(front: Front) -> Tabular:
+    """What "accurate" takes for frames of a full scan with 80 samples and the prebuilt model, by
+    the SNR that the tare measures."""
+    usual = Configuration("")
+    frames = [
+        one
+        for one in front.points
+        if not one.configuration.warm_start
+        and one.configuration.model_settings == usual.model_settings
+        and (one.configuration.samples, one.configuration.scan) == (usual.samples, usual.scan)
+    ]
+    rows, default = [], default_point(frames)
+    for snr_db in MEASURED_DB:
+        where = Conditions(snr_db=snr_db)
+        drawn = replace(where, judged="drawn")
+        point = choose(frames, named_preset("accurate", "host", snr_db=snr_db), default=default)
+        rows.append(
+            (
+                f"{snr_db:g} dB",
+                point.name,
+                _times(point, "host"),
+                f"{_cells(point, where)[1]} / {_cells(default, where)[1]}",
+                f"{_cells(point, drawn)[1]} / {_cells(default, drawn)[1]}",
+            )
+        )
+    return FOLLOWED_HEAD, rows
+
+
+def _preset_row(name: str, point: OperatingPoint | None, board: str) -> tuple[str, ...]:
+    assert point is not None
+    one = point.configuration
+    report = point.cost(REPORT_US, board, Conditions())
+    assert report is not None
+
+    def at_snrs(judged: str) -> str:
+        values = [point.accuracy(Conditions(snr_db=snr, judged=judged)) for snr in MEASURED_DB]
+        return " / ".join("-" if value is None else _share(value) for value in values)
+
+    return (
+        f"{name}, {'board' if board == 'f767' else 'host'}",
+        point.name,
+        f"{one.scan}, {one.samples} samples, {point.costs['acquisition_us'] / 1e3:.1f}",
+        _times(point, board),
+        f"{report / 1e3:.0f}",
+        at_snrs("image"),
+        at_snrs("drawn"),
+    )
 
 
 def recommendation_table(front: Front) -> Tabular:
@@ -161,18 +218,19 @@ def conditions(front: Front) -> str:
     """How the numbers came about, in a sentence or two."""
     how = front.settings
     return (
-        f"{len(front.points)} configurations; seed {how.get('seed')}; {how.get('scenes')} test"
-        f" scenes, {how.get('train_scenes')} training scenes, {how.get('set_scenes')} of each other"
-        f" set; frames from a mesh of about {how.get('simulated_elements')} elements, models from"
-        f" one of about {how.get('model_elements')}. Instructions: {how.get('instructions')}. Host:"
+        f"Commit {how.get('commit')}; {len(front.points)} configurations; seed {how.get('seed')};"
+        f" {how.get('scenes')} test scenes, {how.get('train_scenes')} training scenes,"
+        f" {how.get('set_scenes')} of each other set; frames from a mesh of about"
+        f" {how.get('simulated_elements')} elements, models from one of about"
+        f" {how.get('model_elements')}. Instructions: {how.get('instructions')}. Host:"
         f" {how.get('machine')}, {how.get('kernels')} kernels, one thread of a shared virtual"
         f" machine, medians of {how.get('rounds')} interleaved rounds."
     )
 
 
 def fill_page(page: Path, front: Front, pictures: Path, names: tuple[str, ...]) -> None:
-    """Fill the marks ``conditions``, ``presets``, ``front`` and ``recommendations`` of ``page``;
-    pictures go into ``PICTURES`` beside it.
+    """Fill the marks ``conditions``, ``verdict``, ``presets``, ``followed``, ``equal``, ``scans``
+    and ``front`` of ``page``; pictures go into ``PICTURES`` beside it.
 
     Raises:
         FileError: the page cannot be read or written.
@@ -180,10 +238,13 @@ def fill_page(page: Path, front: Front, pictures: Path, names: tuple[str, ...]) 
     """
     tables = {
         "presets": preset_table(front),
+        "followed": followed_table(front),
+        "equal": equal_table(front),
+        "scans": scan_table(),
         "front": front_table(front),
         "recommendations": recommendation_table(front),
     }
-    texts = {"conditions": conditions(front)}
+    texts = {"conditions": conditions(front), "verdict": verdict(front)}
     fill_marks(page, "tradeoff", (texts, tables))
     folder = page.parent / PICTURES
     folder.mkdir(parents=True, exist_ok=True)

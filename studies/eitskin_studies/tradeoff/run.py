@@ -2,14 +2,13 @@
 it comes."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from eitskin import __version__
 from eitskin.core.engine import load_core
@@ -20,6 +19,7 @@ from eitskin.skin.skin import Skin, paper_skin
 from eitskin.skin.uncertainty import DEFAULT_UNCERTAINTY
 from eitskin.tuning.configuration import ELEMENTS, Configuration
 from eitskin.tuning.front import Front, OperatingPoint
+from eitskin_studies.harness.commit import last_commit
 from eitskin_studies.harness.machine import machine
 from eitskin_studies.harness.sessions import FrameSession
 from eitskin_studies.harness.store import Store
@@ -29,7 +29,7 @@ from eitskin_studies.tradeoff.emulation import Emulator, count_instructions, mak
 from eitskin_studies.tradeoff.engines import Built, ModelShop
 from eitskin_studies.tradeoff.fronts import estimated_instructions, recorded_front
 from eitskin_studies.tradeoff.host_times import host_times
-from eitskin_studies.tradeoff.peers import score_peers, time_peers
+from eitskin_studies.tradeoff.peers import SCANS, Peers
 from eitskin_studies.tradeoff.scene_sets import HEADLINE, HEADLINE_DB, SETS, TRAIN, SceneFactory
 
 RESULTS = "results.jsonl"
@@ -42,7 +42,8 @@ class RunSettings:
     Attributes:
         scenes, train_scenes, set_scenes: of the set "random", of "train", and of each other set.
         sets: those beside "random".
-        snrs_db: 60 is always among them: t and costs are of 60 dB.
+        snrs_db: of the set "random"; the other sets are measured at 60 dB alone. 60 is always among
+            them: t and costs are of 60 dB.
         seed: of all that is random.
         simulated_elements: of the mesh that frames come from; models are made on one of about
             3,000.
@@ -118,6 +119,12 @@ class _Desk:
             name, counts.get(name, self.settings.set_scenes), self.progress
         )
 
+    def kept(self, facts: dict[str, Any], make: Callable[[], Any]) -> Any:
+        """Return what is stored for ``facts``; it is made and stored if it is not there yet."""
+        facts = {**self.world, **facts}
+        found = self.store.get(facts)
+        return self.store.put(facts, make()) if found is None else found
+
     def facts(self, one: Configuration, what: str, **more: Any) -> dict[str, Any]:
         settings = {name: value for name, value in one.as_dict().items() if name != "name"}
         return {**self.world, "what": what, "configuration": settings, **more}
@@ -159,7 +166,8 @@ def run(
     trained = {
         one.name: _train(workspace, one) for one in progress(configurations, "choosing thresholds")
     }
-    cells = [(name, snr_db) for name in (HEADLINE, *settings.sets) for snr_db in settings.snrs_db]
+    cells = [(HEADLINE, snr_db) for snr_db in settings.snrs_db]
+    cells += [(name, HEADLINE_DB) for name in settings.sets]
     scores: dict[str, dict[str, dict[str, Any]]] = {one.name: {} for one in configurations}
     # cell by cell, so that frames with noise are made once for all configurations that measure
     # alike
@@ -189,6 +197,7 @@ def run(
         "kernels": kernels,
     }
     facts |= {"skin": skin.name, "instructions": why, "model_elements": ELEMENTS}
+    facts["commit"] = last_commit(("csrc", "python", "studies/eitskin_studies"))
     facts["peers"] = _peers(workspace, skin, protocol)
     return Front({**settings.as_dict(), **facts}, tuple(_estimated(points)), str(folder))
 
@@ -330,35 +339,34 @@ def _host(
 
 
 def _peers(workspace: _Desk, skin: Skin, protocol: Protocol) -> list[dict[str, Any]]:
-    """The other methods, timed where configurations are; none where they are not wanted."""
+    """The other methods on every scan and SNR, timed where configurations are; none where they are
+    not wanted."""
     how = workspace.settings
     if not how.peers:
         return []
-    settings = {
-        "scenes": how.scenes,
-        "train_scenes": how.train_scenes,
-        "seed": how.seed,
-        "simulated_elements": how.simulated_elements,
-        "snr_db": HEADLINE_DB,
-    }
-    facts = {**workspace.world, "what": "peers", **settings}
-    peers = workspace.store.get(facts)
-    if peers is None:
-        peers = workspace.store.put(
-            facts, score_peers(skin, protocol, settings, workspace.progress)
+    made: list[Peers] = []
+
+    def peers() -> Peers:
+        if not made:
+            made.append(Peers(skin, protocol))
+        return made[0]
+
+    names = workspace.kept({"what": "peers", "scenes": how.scenes}, lambda: list(peers().names))
+    sessions = workspace.session(TRAIN), workspace.session(HEADLINE)
+    cells = [(scan, snr, name) for scan in SCANS for snr in how.snrs_db for name in names]
+    rows = []
+    for scan, snr_db, name in workspace.progress(cells, "other methods"):
+        facts = {"what": "peer", "name": name, "scan": vars(scan), "snr_db": snr_db}
+        row = workspace.kept(
+            facts | {"scenes": how.scenes},
+            partial(lambda *cell: peers().score(cell[0], *sessions, *cell[1:]), name, scan, snr_db),
         )
-    if not how.rounds:
-        return list(peers)
-    facts |= {"what": "peers, host", "machine": machine(), "rounds": how.rounds}
-    times = workspace.store.get(facts)
-    if times is None:
-        usual = Configuration("")
-        measured = workspace.session(HEADLINE).measured(HEADLINE_DB, usual.samples, usual.scan, 1)
-        dv = np.array([frames_v[-1] for frames_v in measured.frames_v]) - measured.untouched_v.mean(
-            0
-        )
-        times = workspace.store.put(facts, time_peers(skin, protocol, peers, dv, how.rounds))
-    return [{**one, "host_us": us} for one, us in zip(peers, times, strict=True)]
+        if how.rounds:
+            timed = facts | {"what": "peer, host", "machine": machine(), "rounds": how.rounds}
+            cell = (name, row["value"], sessions[1], scan, snr_db, how.rounds)
+            row = row | workspace.kept(timed, partial(lambda *c: peers().time(*c), *cell))
+        rows.append(row)
+    return rows
 
 
 def _estimated(points: Sequence[OperatingPoint]) -> list[OperatingPoint]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
+from eitskin.core.results import Reconstruction
 from eitskin.errors import FrameError
 from eitskin.progress import Progress, silent
 from eitskin.scoring.matching import match
@@ -96,6 +97,7 @@ class CoreFinder:
         self.solver, self._own_sign = solver, solver.options.sign
         self.diagnostics: tuple[str, ...] = ()
         self.touch_macs = 0
+        self._result: Reconstruction | None = None
 
     def look_for(self, sign: str | None) -> None:
         """Changes of ``sign`` from now on; None: as the solver was reported at first."""
@@ -105,14 +107,22 @@ class CoreFinder:
         self, untouched_v: FloatArray, frame_v: FloatArray, step_v: float
     ) -> tuple[Touch, ...]:
         """As ``Finder``; a board tells its step, too (``BoardInfo.noise_floor_v``)."""
-        self.diagnostics, self.touch_macs = (), 0
+        self.diagnostics, self.touch_macs, self._result = (), 0, None
         self.solver.set_options(noise_floor_v=step_v / math.sqrt(12))
         self.solver.tare(untouched_v)
         self.solver.forget()
         result = self.solver.reconstruct(frame_v)
         self.diagnostics = tuple(result.info.diagnostics_by_name)
         self.touch_macs = result.info.touch_macs
+        self._result = result
         return result.touches
+
+    @property
+    def result(self) -> Reconstruction:
+        """The last frame's result; an AttributeError if there is none."""
+        if self._result is None:
+            raise AttributeError("no frame was reconstructed")
+        return self._result
 
 
 def score_set(found_by: Finder, of: WorldScenes) -> WorldScore:

@@ -1,10 +1,27 @@
 """Which point is chosen for a budget or an accuracy, on made-up points."""
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
+from eitskin import load_model
 from eitskin.device.settings import SolverSettings
 from eitskin.errors import ConfigError, FileError, UsageError
-from eitskin.tuning.front import Limit, choose, load_front, read_limit
+from eitskin.model.options import default_options
+from eitskin.tuning.for_model import operating_point_for
+from eitskin.tuning.front import (
+    MEASURED_DB,
+    Conditions,
+    Limit,
+    OperatingPoint,
+    board_takes,
+    choose,
+    default_point,
+    load_front,
+    named_preset,
+    read_limit,
+)
 from made_points import COLD, HERE, point, target
 
 
@@ -69,7 +86,7 @@ def test_boards_get_only_what_they_can_be_told():
     assert choose([*COLD, half], target("10ms")).name == "c"
     limited = point("limited", 0.9, 1e5, mac_limit=5)
     assert not limited.fits_f767 or "mac_limit" in SolverSettings.__dataclass_fields__
-    assert not point("large", 0.9, 1e5, ram_bytes=300_000).fits_f767
+    assert not point("large", 0.9, 1e5, ram_bytes=380_000).fits_f767
 
 
 @pytest.mark.parametrize(
@@ -104,3 +121,53 @@ def test_files_that_are_no_results_are_refused(tmp_path):
             load_front(path)
     with pytest.raises(FileError):
         load_front(tmp_path / "absent.json")
+
+
+def scored(name: str, by_snr: dict[float, tuple[float, float]], **more: Any) -> OperatingPoint:
+    """A made-up point with the MIoU of the solver's and of the shown image at each SNR."""
+    made = point(name, 0.5, 216e3, **more)
+    cell = made.scores["random"]["60"]
+    cells = {
+        f"{snr:g}": cell | {"image": {"mean": image}, "drawn": {"mean": drawn}}
+        for snr, (image, drawn) in by_snr.items()
+    }
+    return replace(made, scores={"random": cells})
+
+
+USUAL = scored("usual", {40.0: (0.82, 0.87), 60.0: (0.86, 0.94), 80.0: (0.86, 0.95)})
+FINE_AT_60 = scored("fine at 60", {40.0: (0.75, 0.85), 60.0: (0.89, 0.95), 80.0: (0.87, 0.96)})
+WORSE_SHOWN = scored("worse shown", {40.0: (0.82, 0.87), 60.0: (0.90, 0.93), 80.0: (0.90, 0.94)})
+ALWAYS = scored("always", {40.0: (0.83, 0.87), 60.0: (0.87, 0.94), 80.0: (0.86, 0.95)})
+
+
+@pytest.mark.parametrize(
+    ("snr_db", "name"),
+    [(None, "always"), (38.0, "always"), (57.0, "fine at 60"), (99.0, "fine at 60")],
+)
+def test_accurate_is_chosen_by_the_noise_and_never_below_the_default(snr_db, name):
+    points = [USUAL, FINE_AT_60, WORSE_SHOWN, ALWAYS]
+    for preset in ("balanced", "accurate"):
+        asked = named_preset(preset, "host", snr_db=snr_db)
+        assert choose(points, asked, default=USUAL).name == name
+        assert choose([USUAL], asked, default=USUAL) is USUAL
+
+
+@pytest.mark.parametrize("board", ["f767", "host"])
+@pytest.mark.parametrize("snr_db", [None, *MEASURED_DB])
+@pytest.mark.parametrize("prebuilt_model", [False, True])
+def test_measured_presets_are_at_least_as_accurate_as_the_default(board, snr_db, prebuilt_model):
+    points = [one for one in load_front().points if not one.configuration.warm_start]
+    default = default_point(points)
+    assert default is not None
+    for name in ("balanced", "accurate"):
+        asked = named_preset(name, board, snr_db=snr_db)
+        if prebuilt_model:
+            model = load_model()
+            settable = board_takes() if board == "f767" else None
+            chosen = operating_point_for(asked, model, default_options(model), settable)
+        else:
+            chosen = choose(points, asked, default=default)
+        for snr in MEASURED_DB if snr_db is None else (snr_db,):
+            for judged in ("image", "drawn"):
+                place = Conditions(snr_db=snr, judged=judged)
+                assert (chosen.accuracy(place) or 0) >= (default.accuracy(place) or 1)

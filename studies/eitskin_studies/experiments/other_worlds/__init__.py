@@ -14,11 +14,13 @@ from eitskin_studies.experiments.other_worlds.ellipses import (
     ellipses_of,
     ellipses_table,
 )
+from eitskin_studies.experiments.other_worlds.images import image_scores
 from eitskin_studies.experiments.other_worlds.tables import (
     conditions,
     fails_table,
     headline_table,
     holds_table,
+    images_table,
     summary,
 )
 from eitskin_studies.pictures.worlds_pictures import draw_examples, draw_shares
@@ -61,7 +63,8 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     def scored(name: str) -> dict[str, Any]:
         drawn = scenes(name)
         without = score_set(bare, drawn).as_dict()
-        return {**score_set(finder, drawn).as_dict(), "without": without}
+        images = image_scores(finder, drawn)
+        return {**score_set(finder, drawn).as_dict(), "without": without, "images": images}
 
     scores = [
         of_set(name, "score", lambda name=name: scored(name))
@@ -77,6 +80,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     }
     return ExperimentOutcome(
         tables=(
+            images_table(scores),
             fails_table(scores),
             ellipses_table(ellipses),
             holds_table(scores),

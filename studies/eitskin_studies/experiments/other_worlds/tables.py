@@ -63,6 +63,35 @@ HEADLINES = (
 )
 
 
+def images_table(scores: Scores) -> Table:
+    """Counts, places and images of each set with touches; the README's numbers are of it."""
+    head = (
+        "set", "exact (95 %)", "median / p95, mm", "image shown (95 %)", "worst 10 %",
+        "solver's image",
+    )  # fmt: skip
+    rows = []
+    for one in scores:
+        if one["images"] is None:
+            continue
+        shown, solver = one["images"]["shown"], one["images"]["solver"]
+        places = ("-" if one[key] is None else f"{one[key]:.2f}" for key in ("median_mm", "p95_mm"))
+        rows.append(
+            (
+                f"`{one['name']}`",
+                _number(one, EXACT),
+                " / ".join(places),
+                f"{_share(shown['mean'])} ({_share(shown['low'])} to {_share(shown['high'])})",
+                _share(shown["worst_tenth"]),
+                _share(solver["mean"]),
+            )
+        )
+    return Table("images", head, tuple(rows))
+
+
+def _share(value: float) -> str:
+    return f"{value:.3f}".lstrip("0")
+
+
 def fails_table(scores: Scores) -> Table:
     """Sets of which fewer than 90 % of the scenes are exact, the worst first."""
     return Table("fails", HEAD, tuple(map(_row, sorted(_failing(scores), key=_exact))))

@@ -1,0 +1,190 @@
+"""Accuracy over the time from contact to report: all methods on equal scans at each SNR, and the
+board with its range of times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from eitskin.tuning.front import F767_MHZ, REPORT_US, Conditions, Front, OperatingPoint
+from eitskin.tuning.report_time import report_us
+from eitskin.view.panels import save_picture
+from eitskin.view.pictures import INK, STYLE, load_matplotlib
+from eitskin_studies.tradeoff.equal import Reached, reached
+from eitskin_studies.tradeoff.fronts import chosen_presets, pareto
+from eitskin_studies.tradeoff.peers import SCANS
+from eitskin_studies.tradeoff.table import MIN_GAIN
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# safe for colour-blind readers (Okabe and Ito)
+COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#333333", "#d55e00", "#e69f00", "#cc79a7", "#999999")
+MARKERS = dict(zip(SCANS, "osD^", strict=True))
+OTHER = "#8a8a8a"
+NAMED = {"plain FISTA 3000, non-negative": "#d55e00", "plain FISTA 300, non-negative": "#e69f00"}
+BOARD_LABELS = (
+    "mean frame at an instruction per cycle",
+    "mean frame, from the optimistic to the pessimistic bound",
+    "to the slowest frame by the pessimistic bound",
+)
+TICKS_MS = (15, 20, 30, 50, 100, 200, 400)
+# Cycles per instruction of solve and touches: emu:two_touch takes 14.8 to 34.1 ms by the two bounds
+# of board-cost.md, and 11.6 ms at an instruction per cycle.
+BOARD_BOUNDS = (14.8 / 11.6, 34.1 / 11.6)
+
+
+def draw_equal(path: Path, front: Front) -> None:
+    """All methods at 60 dB, a line each over the four scans."""
+    _draw_panels(path, front, (60.0,))
+
+
+def draw_equal_by_noise(path: Path, front: Front) -> None:
+    """All methods at each SNR."""
+    _draw_panels(path, front, tuple(front.settings["snrs_db"]))
+
+
+def _draw_panels(path: Path, front: Front, snrs_db: Sequence[float]) -> None:
+    matplotlib = load_matplotlib()
+    every = reached(front)
+    with matplotlib.rc_context(STYLE):
+        width = 9.0 if len(snrs_db) == 1 else 14.0
+        figure = matplotlib.figure.Figure(figsize=(width, 5.6), layout="constrained")
+        panels = figure.subplots(1, len(snrs_db), sharey=True, squeeze=False)[0]
+        for axes, snr_db in zip(panels, snrs_db, strict=True):
+            _draw_methods(
+                axes, [one for one in every if one.snr_db == snr_db], named=len(panels) == 1
+            )
+            axes.set_title(f"SNR {snr_db:g} dB")
+            axes.set_xlabel("ms from contact to report (half a period, scan, solve, link)")
+        panels[0].set_ylabel("mean MIoU of the image")
+        _legend(panels[-1], every, named=len(panels) == 1)
+        how = front.settings
+        figure.suptitle(
+            f"All methods on equal scans: {how.get('scenes')} scenes of 1 to 3 touches, seed"
+            f" {how.get('seed')}, solver on a host"
+        )
+        save_picture(figure, path)
+
+
+def _style(name: str, ours: Sequence[str]) -> tuple[str, float]:
+    """Colour and line width of a method."""
+    if name in ours:
+        return COLOURS[ours.index(name) % 4], 1.8
+    return NAMED.get(name, OTHER), 1.0
+
+
+def _draw_methods(axes: Axes, every: Sequence[Reached], named: bool) -> None:
+    ours = list(dict.fromkeys(one.name for one in every if one.ours))
+    ends = []
+    for name in dict.fromkeys(one.name for one in every):
+        line = sorted((one for one in every if one.name == name), key=lambda one: one.report_ms)
+        colour, width = _style(name, ours)
+        xs, ys = [one.report_ms for one in line], [one.mean for one in line]
+        axes.plot(xs, ys, color=colour, linewidth=width, alpha=0.85)
+        for one in line:
+            axes.plot(one.report_ms, one.mean, MARKERS[one.scan], ms=4.5, color=colour)
+        ends.append((ys[-1], xs[-1], name, colour))
+    axes.set_xscale("log")
+    axes.set_xticks(TICKS_MS, [str(ms) for ms in TICKS_MS])
+    axes.minorticks_off()
+    axes.grid(linewidth=0.4, alpha=0.5)
+    axes.spines[["top", "right"]].set_visible(False)
+    if named:
+        low, high = axes.get_ylim()
+        axes.set_xlim(12, 3000)
+        _name_ends(axes, ends, 0.034 * (high - low))
+
+
+def _name_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]], least: float) -> None:
+    """Names to the right of the lines, spread where they would collide."""
+    previous = float("-inf")
+    for y, x, name, colour in sorted(ends):
+        at = max(y, previous + least)
+        previous = at
+        axes.annotate(
+            name,
+            (x, y),
+            xytext=(max(1.2 * x, 62.0) if x < 200 else 1.15 * x, at),
+            fontsize=7,
+            color=colour if colour != OTHER else INK,
+            va="center",
+            arrowprops={"arrowstyle": "-", "color": OTHER, "linewidth": 0.4, "shrinkB": 3},
+        )
+
+
+def _legend(axes: Axes, every: Sequence[Reached], named: bool) -> None:
+    """What markers mean, and colours where lines have no names."""
+    line = load_matplotlib().lines.Line2D
+    ours = list(dict.fromkeys(one.name for one in every if one.ours))
+    entries = {} if named else {name: _style(name, ours)[0] for name in (*ours, *NAMED)}
+    handles = [line([], [], color=colour) for colour in entries.values()]
+    labels = list(entries)
+    if not named:
+        handles.append(line([], [], color=OTHER))
+        labels.append("other methods")
+    for scan in SCANS:
+        handles.append(line([], [], color=INK, marker=MARKERS[scan], linestyle="none", ms=4.5))
+        labels.append(scan.name)
+    axes.legend(handles, labels, frameon=False, loc="lower right", fontsize=7)
+
+
+def draw_board(path: Path, front: Front) -> None:
+    """The board: image MIoU over the time to the report with the range of its times, presets
+    named."""
+    matplotlib = load_matplotlib()
+    usable = [one for one in front.points if one.fits_f767 and not one.configuration.warm_start]
+    line = pareto(
+        usable,
+        lambda one: one.cost(REPORT_US, "f767", Conditions()),
+        lambda one: one.accuracy(Conditions()),
+        MIN_GAIN,
+    )
+    presets = chosen_presets(usable, "f767")
+    shown = {one.name: one for one in (*line, *presets.values()) if one.instructions is not None}
+    with matplotlib.rc_context(STYLE):
+        figure = matplotlib.figure.Figure(figsize=(9.0, 5.0), layout="constrained")
+        axes = figure.subplots()
+        for number, one in enumerate(shown.values()):
+            ms, low_ms, high_ms, most_ms = _board_ms(one)
+            y = one.accuracy(Conditions()) or 0.0
+            labels = BOARD_LABELS if not number else ("", "", "")
+            axes.plot(ms, y, "o", mfc="none", color=COLOURS[0], ms=5, label=labels[0])
+            axes.plot([low_ms, high_ms], [y, y], color=COLOURS[0], lw=4, alpha=0.4, label=labels[1])
+            axes.plot([high_ms, most_ms], [y, y], color=COLOURS[4], lw=1, label=labels[2])
+        _name_presets(axes, presets)
+        axes.set_xlabel("ms from contact to report on the board (half a period, scan, solve, link)")
+        axes.set_ylabel("mean MIoU of the solver's image")
+        axes.set_xlim(left=0)
+        axes.grid(linewidth=0.4, alpha=0.5)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(frameon=False, loc="lower right")
+        axes.set_title("The board at 60 dB: Pareto-optimal settings and presets, bounds of time")
+        save_picture(figure, path)
+
+
+def _board_ms(point: OperatingPoint) -> tuple[float, float, float, float]:
+    """The report of the mean frame at an instruction per cycle, at the optimistic and at the
+    pessimistic bound, and of the slowest frame at that bound."""
+    assert point.instructions is not None
+    mean_us, most_us = (point.instructions[key] / F767_MHZ for key in ("mean", "most"))
+    scan = float(point.costs["acquisition_us"])
+    low, high = BOARD_BOUNDS
+    times = (mean_us, low * mean_us, high * mean_us, high * most_us)
+    a, b, c, d = (report_us(scan, us, "f767") / 1e3 for us in times)
+    return a, b, c, d
+
+
+def _name_presets(axes: Axes, presets: dict[str, OperatingPoint]) -> None:
+    names: dict[str, list[str]] = {}
+    for name, one in presets.items():
+        names.setdefault(one.name, []).append(name)
+    for name, one in {one.name: one for one in presets.values()}.items():
+        if one.instructions is not None:
+            x, y = _board_ms(one)[0], one.accuracy(Conditions()) or 0.0
+            axes.annotate(
+                ", ".join(names[name]), (x, y), xytext=(0, 9), textcoords="offset points",
+                ha="center", fontweight="bold", color=INK,
+            )  # fmt: skip
+            axes.plot(x, y, "o", ms=11, mfc="none", mec=INK, mew=1.4)
