@@ -40,6 +40,7 @@ void example_tick_irq(void)
 {
 }
 
+/* An interrupt that comes just before is noticed with the next tick at the latest. */
 static void wait_for_interrupt(void *ctx)
 {
     (void)ctx;

@@ -3,16 +3,28 @@
 from math import ceil
 
 from eitskin.device.client import Device
-from eitskin.device.wire.link_table import Stream
+from eitskin.device.wire.link_table import (
+    DriveTouch,
+    DriveTouchesHead,
+    EventPacket,
+    EventsHead,
+    RawHead,
+    SolvedPacket,
+    Stream,
+    TouchPacket,
+)
 from eitskin.device.wire.packets import BoardInfo
 
 BITS_A_BYTE = 10  # start, eight, stop
 USED = 0.9  # of the line; the rest is for replies, faults and what comes in bursts
 PACKET_BYTES = 16  # head, checksum, zeros and stuffing
-RAW_BYTES, ROW_BYTES = 16, 5
-SOLVED_BYTES, PIXEL_BYTES, TOUCHES_BYTES = 104, 4, 8 * 44
-EVENTS_BYTES = 12 + 4 * 28
-DRIVE_TOUCHES_BYTES = 20 + 24  # of one touch, after each drive
+ROW_BYTES = 4 + 1  # the voltage and the quality
+PIXEL_BYTES = 4
+RAW_BYTES, SOLVED_BYTES = RawHead.LAYOUT.size, SolvedPacket.LAYOUT.size
+# of a busy frame: eight touches, four events; after each drive one touch
+TOUCHES_BYTES = 8 * TouchPacket.LAYOUT.size
+EVENTS_BYTES = EventsHead.LAYOUT.size + 4 * EventPacket.LAYOUT.size
+DRIVE_TOUCHES_BYTES = DriveTouchesHead.LAYOUT.size + DriveTouch.LAYOUT.size
 
 
 def frame_bytes(info: BoardInfo, what: Stream) -> int:

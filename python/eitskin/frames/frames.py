@@ -110,6 +110,12 @@ class Frames:
         self._check_touches(n)
         self._check_mask(n)
 
+    def row_times_s(self, k: int) -> FloatArray | None:
+        """Return when each row of frame k was measured (m,), if that is known."""
+        if self.time_s is None or self.row_time_s is None:
+            return None
+        return np.asarray(self.row_time_s + float(self.time_s[k]))
+
     def _set(self, name: str, value: Any) -> None:
         if isinstance(value, np.ndarray):
             value = value.view()

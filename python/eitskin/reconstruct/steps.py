@@ -270,7 +270,7 @@ def solve(
         batch.tare(frames.reference_voltage_v)
         solved = batch.each(frames.voltage_v[chosen])
     else:
-        solved = _one_by_one(reconstructor, frames.voltage_v[chosen], how.tracked(frames), how.warm)
+        solved = _one_by_one(reconstructor, frames, chosen, how)
     results: Results = {}
     refused: dict[int, str] = {}
     for number, result in zip(chosen, progress(solved, len(chosen)), strict=True):
@@ -282,13 +282,17 @@ def solve(
 
 
 def _one_by_one(
-    reconstructor: Reconstructor, frames_v: Any, tracked: bool, warm: bool
+    reconstructor: Reconstructor, frames: Frames, chosen: list[int], how: ReconstructSettings
 ) -> Iterator[Reconstruction | FrameError]:
-    for frame_v in frames_v:
-        if not (tracked or warm):
+    tracked = how.tracked(frames)
+    for k in chosen:
+        if not (tracked or how.warm):
             reconstructor.forget()
         try:
-            yield reconstructor.follow(frame_v) if tracked else reconstructor.reconstruct(frame_v)
+            if tracked:
+                yield reconstructor.follow(frames.voltage_v[k], frames.row_times_s(k))
+            else:
+                yield reconstructor.reconstruct(frames.voltage_v[k])
         except FrameError as error:
             yield error
 

@@ -23,6 +23,7 @@ from eitskin.scene.effect import (
     Contacts,
     ContactStep,
     DeformationStep,
+    GeometryStep,
     LoadedStep,
     Loads,
     MaterialStep,
@@ -217,6 +218,7 @@ def prepare_scene(
     }
     check_shared(scene, modules, parameters)
     steps, skin = make_steps(scene, modules, parameters, mesh_cache, work)
+    _refuse_flat_effects(scene, skin, steps)
     phase = _only_phase(scene, steps)
     factors, work.v0_factors = work.v0_factors, None
     return Prepared(scene, skin, steps, parameters, phase, mesh_cache, work, factors)
@@ -309,6 +311,20 @@ def background_of(compiled: Compiled) -> Callable[[State], FloatArray]:
         return conductivity
 
     return background
+
+
+def _refuse_flat_effects(scene: Scene, skin: Skin, steps: Sequence[Step]) -> None:
+    """Reject effects that move the outline of a skin whose outline belongs to a surface."""
+    if skin.surface is None:
+        return
+    names = [step.name for step in steps if isinstance(step, DeformationStep)]
+    if skin.outline != scene.skin.outline:
+        names += [step.name for step in steps if isinstance(step, GeometryStep)]
+    if names:
+        raise ConfigError(
+            f"{scene.where} [effects.{names[0]}]: this effect is for flat skins, and"
+            f" {skin.name!r} covers a surface; describe the deformed surface by another mesh"
+        )
 
 
 def _only_phase(scene: Scene, steps: Sequence[Step]) -> PhaseStep | None:

@@ -17,6 +17,7 @@ from eitskin.scene.description import Scene
 from eitskin.scene.laws import ShortCircuit
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.touch_path import sample, touches_at
+from eitskin.surface.surface_map import SurfaceMap
 
 MAX_CELLS = 500_000_000
 LAW_PIECES = 16  # straight lines between two keyframes, for a nonlinear law
@@ -88,13 +89,18 @@ def _states_at_truth(compiled: Compiled) -> tuple[IntArray, list[State]]:
 
 
 def mask_of(
-    touches: tuple[TrueTouch, ...], x_mm: FloatArray, y_mm: FloatArray
+    touches: tuple[TrueTouch, ...],
+    x_mm: FloatArray,
+    y_mm: FloatArray,
+    surface: SurfaceMap | None = None,
 ) -> npt.NDArray[np.int8]:
     """Return +1 where the centres (h, w) lie in a conductive touch, -1 in a resistive one,
-    otherwise 0."""
+    otherwise 0. On a ``surface`` the centres are those of its flattened copy, and a touch has there
+    its true size over the scale at its middle."""
     mask = np.zeros(x_mm.shape, dtype=np.int8)
     for touch in touches:
-        inside = touch.covers(x_mm - touch.x_mm, y_mm - touch.y_mm)
+        scale = 1.0 if surface is None else float(surface.at([[touch.x_mm, touch.y_mm]]).scale[0])
+        inside = touch.covers(scale * (x_mm - touch.x_mm), scale * (y_mm - touch.y_mm))
         mask[inside] = 1 if touch.contrast > 1 else -1
     return mask
 
@@ -120,7 +126,7 @@ def _rasters(
     masks = np.zeros((len(used), grid.ny, grid.nx), dtype=np.int8)
     images = np.zeros((len(used), grid.ny, grid.nx), dtype=np.float32)
     for k, state in enumerate(states[number] for number in used):
-        masks[k] = mask_of(state.touches, x_mm, y_mm)
+        masks[k] = mask_of(state.touches, x_mm, y_mm, compiled.skin.surface)
         conductivity = background(state).copy()
         conductivity[state.change.elements] *= state.change.mean
         values = share @ conductivity / np.where(total > 0, total, np.nan)

@@ -38,14 +38,15 @@ class Matching:
 
 
 def match(true_mm: npt.ArrayLike, found_mm: npt.ArrayLike, gate_mm: float = GATE_MM) -> Matching:
-    """Match true positions (k, 2) with found ones (l, 2): the matching has as many pairs within the
-    gate as possible, and of such matchings the least sum of distances.
+    """Match true positions (k, 2) with found ones (l, 2), or both in space (3): the matching has as
+    many pairs within the gate as possible, and of such matchings the least sum of distances.
 
     One assignment problem does both. A pair beyond the gate costs more than all pairs within it
     could together, so that a pair is never given up for shorter distances elsewhere.
     """
-    true = np.asarray(true_mm, dtype=np.float64).reshape(-1, 2)
-    found = np.asarray(found_mm, dtype=np.float64).reshape(-1, 2)
+    given = [np.asarray(one, dtype=np.float64) for one in (true_mm, found_mm)]
+    dimensions = next((one.shape[1] for one in given if one.ndim == 2 and one.shape[1]), 2)
+    true, found = (one.reshape(-1, dimensions) for one in given)
     distance = np.sqrt(((true[:, None, :] - found[None, :, :]) ** 2).sum(axis=2))
     cost = np.where(distance <= gate_mm, distance, gate_mm * (min(distance.shape) + 1.0))
     if len(true) > len(found):

@@ -2,7 +2,7 @@
 numpy oracle."""
 
 import threading
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from eitskin.arrays import BoolArray, FloatArray
 from eitskin.config import nearest
+from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
 from eitskin.core.fast import FastCore
 from eitskin.core.results import (
@@ -22,7 +23,7 @@ from eitskin.core.results import (
     check_shape,
     frame_numbers,
 )
-from eitskin.errors import ProtocolError, UsageError
+from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.model.eitm import decode_model, encode_model, load_model
 from eitskin.model.model import Model
 from eitskin.model.options import default_options
@@ -84,6 +85,8 @@ class Reconstructor:
         self._untouched: FloatArray | None = None
         engine_of_c = self.c_engine
         self._tracker = None if engine_of_c is None else FastCore(engine_of_c)
+        self._begun = False  # drives are followed
+        self._found: Sequence[Touch] | None = None  # in the last frame, not told to the tracker yet
         self._streams = OneReader("the touches of this Reconstructor's stream", OTHERS)
         self._options = default_options(model)
         self.set_options(options or self._options)
@@ -154,8 +157,7 @@ class Reconstructor:
         with self.lock:
             learned = self._engine.set_reference(frames)
             self._untouched = frames.copy()
-            if self._tracker is not None:
-                self._tracker.forget()
+            self._forget_touches()
         return learned
 
     def mask_rows(self, rows: BoolArray) -> None:
@@ -184,17 +186,73 @@ class Reconstructor:
         result = self._engine.reconstruct(frame_numbers(frame_v, "frame"), touches=touches)
         return replace(result, model=self.model)
 
-    def follow(self, frame_v: npt.ArrayLike) -> Reconstruction:
+    def follow(
+        self, frame_v: npt.ArrayLike, row_time_s: npt.ArrayLike | None = None
+    ) -> Reconstruction:
         """Reconstruct the next frame (m,) of a stream: a touch keeps its id from frame to frame, is
         ``confirmed`` by its second frame, and reported only then if it is doubtful
         (docs/guide/tracking.md). The numpy engine follows nothing.
 
+        With ``row_time_s`` (m,), when each row was measured by a clock that goes on from frame to
+        frame, touches are followed through the scan, and the frame is reconstructed as of its last
+        drive. This needs a model with fields, and noise from a tare of four frames; without these
+        the times are not used. A frame with drives that nothing explains has the touches of the
+        tracker, the solver's image of its rows as they are, and no diagnostics.
+
         Raises:
-            FrameError: the frame cannot be used, or no reference has been taken.
+            FrameError: the frame or the times cannot be used, or no reference has been taken.
         """
         with self.lock:
+            if row_time_s is not None and self._follows_drives():
+                frame, times = frame_numbers(frame_v, "frame"), frame_numbers(row_time_s, "times")
+                check_shape(np.array([frame, times]), self.model.protocol.n_rows, "frame, times")
+                return self._follow_drives(frame, times)
             result = self.reconstruct(frame_v)
             return result if self._tracker is None else self._tracker.followed(result)
+
+    def _follows_drives(self) -> bool:
+        """Whether drives are followed; the tracker begins at the first."""
+        if self._tracker is None or not self._tracker.rows:
+            return False
+        if not self._begun:
+            try:
+                self._tracker.begin()
+            except FrameError:  # the noise is not known
+                return False
+        self._begun = True
+        return True
+
+    def _follow_drives(self, frame_v: FloatArray, time_s: FloatArray) -> Reconstruction:
+        tracker = self._tracker
+        assert tracker is not None
+        middles = [(float(time_s[rows].mean()), k) for k, rows in enumerate(tracker.rows)]
+        for middle_s, number in sorted(middles):
+            tracker.drive(number, frame_v[tracker.rows[number]], middle_s)
+        if self._found is not None:
+            tracker.confirm(self._found)
+        self._found = None
+        aligned = tracker.aligned(frame_v)
+        if not aligned.trusted:
+            result = self.reconstruct(frame_v, touches=False)
+            touches = tracker.report(None)
+            info = replace(
+                result.info, touches=len(touches), diagnostics=0, open_electrodes=(),
+                bridged_electrodes=(), noisy_electrodes=(),
+            )  # fmt: skip
+            return replace(result, touches=touches, info=info)
+        try:
+            result = self.reconstruct(aligned.volts)
+        except FrameError:
+            tracker.report(None)
+            raise
+        self._found = result.touches
+        reported = tracker.followed(result)
+        return replace(reported, info=tracker.named(reported.info))
+
+    def _forget_touches(self) -> None:
+        self._begun, self._found = False, None
+        if self._tracker is not None:
+            self._tracker.forget()
 
     def stream(self, frames_v: Iterable[npt.ArrayLike]) -> Iterator[Reconstruction]:
         """Reconstruct frames one after another as :meth:`follow` does.
@@ -218,8 +276,7 @@ class Reconstructor:
         """Forget the coefficients for the warm start and the followed touches, so that the next
         frame does not depend on earlier ones."""
         self._engine.forget()
-        if self._tracker is not None:
-            self._tracker.forget()
+        self._forget_touches()
 
 
 def _again(

@@ -87,6 +87,13 @@ def _forearm(u: FloatArray, v: FloatArray, bulge_mm: float = 6.0) -> FloatArray:
     )
 
 
+def flexed_forearm(triangles: int, bulge_mm: float) -> tuple[FloatArray, IntArray]:
+    """Return the points and triangles of the forearm whose muscle bulges by ``bulge_mm``, 6 at
+    rest; the same vertex is the same place of the skin."""
+    flat, faces = square_net(triangles)
+    return _forearm(flat[:, 0], flat[:, 1], bulge_mm), faces
+
+
 SHAPES = {
     "cylinder": Shape(_cylinder, True, 194.0, "a disk of 194 mm around a cylinder of radius 60 mm"),
     "cone": Shape(_cone, True, 194.0, "a disk of 194 mm on a cone with a half angle of 20 degrees"),

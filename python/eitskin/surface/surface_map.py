@@ -17,6 +17,8 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.surface.locate import Locator, nearest_on_segments, nearest_on_triangles
 from eitskin.surface.topology import rim_loop
 
+EXPECTED_RADIUS_SD = 0.3  # of the radius that a touch is given where the data do not tell it
+
 
 @dataclass(frozen=True, eq=False)
 class SurfacePlaces:
@@ -171,7 +173,8 @@ class SurfaceMap:
 
         A disc on the surface lies on the copy as a disc to first order, but its middle does not:
         where the scale s grows, the far half of the flat disc is longer. The middle on the surface
-        is that of the copy's place moved by radius^2 grad(log s) / 2.
+        is that of the copy's place moved by radius^2 grad(log s) / 2. What is not known of the
+        radius adds to the covariance.
         """
         centre = np.array([touch.x_mm, touch.y_mm])
         growth = self.growth_per_mm(centre)[0]
@@ -193,6 +196,10 @@ class SurfaceMap:
                     [touch.xy_covariance_mm2, touch.y_variance_mm2],
                 ]
             )
+            unsure = EXPECTED_RADIUS_SD
+            if touch.radius_sd_mm is not None:
+                unsure = touch.radius_sd_mm / touch.radius_mm
+            flat += np.outer(shift, shift) * (2 * unsure) ** 2
             covariance = tangents @ flat @ tangents.T * (1e-3 * scale) ** 2
         if touch.long_x_mm is not None and touch.long_y_mm is not None:
             long_axis = tangents @ np.array([touch.long_x_mm, touch.long_y_mm]) * (1e-3 * scale)

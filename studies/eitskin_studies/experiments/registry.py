@@ -46,6 +46,10 @@ EXPERIMENTS = {
     "deformation": (
         "a skin stretched and bent, by the flat one's model, before and after a fresh tare"
     ),
+    "surfaces": (
+        "touches on a cylinder, a cone, a hemisphere, a saddle, a fingertip and a forearm, and on a"
+        " forearm that flexes"
+    ),
     "paper": "weights placed one after another from the most sensitive place (Fig. 12)",
     "fast-path": (
         "touches after each drive, while they land, move and lift: false ones, delay, error"

@@ -1,14 +1,12 @@
 """The live page before a simulated skin, as a moving picture, and before a robot.
 
-For the moving picture the page is photographed while the scene passes slowly, and shown at the
-scene's own speed. The clock by which the page counts what it draws passes as slowly, so its rates
-are those of the film.
+For the moving picture the scene is stepped frame by frame, and the page's clock with it: however
+long the photographs take, what is shown, rates included, is what passes at the scene's own speed.
 """
 
 import base64
 import io
 import time
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +14,14 @@ from eitskin.errors import DeviceError
 from eitskin.fileio import write_bytes
 from eitskin_studies.harness.live_page import browser, need_browser, served_page
 
-SPEED = 0.1  # of the scene while it is photographed
-URL = f"sim:play?speed={SPEED}"
-SLOW_CLOCK = (
-    f"const now = performance.now.bind(performance); performance.now = () => {SPEED} * now();"
-)
+URL = "sim:play?speed=0.1"  # it is paused as soon as it shows a frame
+FILM_CLOCK = "window.filmMs = 0; performance.now = () => window.filmMs;"
 WIDTH, HEIGHT = 1120, 772
 RATE_HZ = 24.0  # of the scene
-SHOWN_EVERY = 2  # frames of the scene
-FIRST, LAST = 4, 188  # of the scene's frames
-QUALITY = 60
-PATIENCE_S = 300.0
+SHOWN_EVERY = 3  # frames of the scene
+LAST = 190  # of the scene's frames
+QUALITY = 45
+PATIENCE_S = 60.0  # until the page shows what is waited for
 ROBOT_URL = "robot:examples/robot/arm.urdf?loop=1"  # in a checkout
 ROBOT_TIME_S = 5.0
 
@@ -40,13 +35,10 @@ def draw_live_view(path: Path) -> None:
         FileError: the file cannot be written.
     """
     need_browser()
-    with served_page(URL) as (_, address), browser(address, SLOW_CLOCK) as page:
+    with served_page(URL) as (_, address), browser(address, FILM_CLOCK) as page:
         _set_size(page)
         taken = _shots(page)
-    frames = [frame for frame, _ in taken]
-    steps = [after - frame for frame, after in pairwise(frames)]
-    durations_ms = [round(1e3 * step / RATE_HZ) for step in [*steps, SHOWN_EVERY]]
-    _write(path, [picture for _, picture in taken], durations_ms)
+    _write(path, taken, round(1e3 * SHOWN_EVERY / RATE_HZ))
 
 
 def draw_live_robot(path: Path) -> None:
@@ -55,12 +47,8 @@ def draw_live_robot(path: Path) -> None:
     need_browser()
     with served_page(ROBOT_URL) as (_, address), browser(address) as page:
         _set_size(page)
-        wait = time.monotonic() + PATIENCE_S
-        while _time_s(page) < ROBOT_TIME_S:
-            if time.monotonic() > wait:
-                raise DeviceError(f"{ROBOT_URL}: the page did not get to {ROBOT_TIME_S} s")
-            time.sleep(0.02)
-        _write(path, [_shot(page)], [1000])
+        _wait_for(page, ROBOT_TIME_S)
+        _write(path, [_shot(page)], 1000)
 
 
 def _set_size(page: Any) -> None:
@@ -71,7 +59,7 @@ def _set_size(page: Any) -> None:
     page.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": True})
 
 
-def _write(path: Path, pictures: list[bytes], durations_ms: list[int]) -> None:
+def _write(path: Path, pictures: list[bytes], duration_ms: int) -> None:
     from PIL import Image
 
     shots = [Image.open(io.BytesIO(data)).convert("RGB") for data in pictures]
@@ -81,10 +69,10 @@ def _write(path: Path, pictures: list[bytes], durations_ms: list[int]) -> None:
         "WEBP",
         save_all=True,
         append_images=shots[1:],
-        duration=durations_ms,
+        duration=duration_ms,
         loop=0,
         quality=QUALITY,
-        method=6,
+        method=4,
         minimize_size=True,
     )
     write_bytes(path, buffer.getvalue())
@@ -100,19 +88,28 @@ def _shot(page: Any) -> bytes:
     return base64.b64decode(page.execute_cdp_cmd("Page.captureScreenshot", {})["data"])
 
 
-def _shots(page: Any) -> list[tuple[int, bytes]]:
-    """Pictures of about every ``SHOWN_EVERY``-th frame of the scene, with their numbers."""
-    shots: list[tuple[int, bytes]] = []
-    wanted, give_up = FIRST, time.monotonic() + PATIENCE_S
-    while wanted <= LAST:
+def _wait_for(page: Any, time_s: float) -> float:
+    """Wait until the page shows a frame of ``time_s`` or later, and return its time."""
+    give_up = time.monotonic() + PATIENCE_S
+    while (shown_s := _time_s(page)) < time_s - 0.01:
         if time.monotonic() > give_up:
-            raise DeviceError(f"{URL}: the page did not get to frame {LAST} of the scene")
-        frame = round(RATE_HZ * _time_s(page))
-        if frame < wanted:
-            if page.find_element("id", "state").text == "over":
-                break
-            time.sleep(0.02)
-            continue
-        wanted = frame + SHOWN_EVERY
-        shots.append((frame, _shot(page)))
+            raise DeviceError(f"the page does not show a frame of {time_s:.2f} s")
+        time.sleep(0.005)
+    return shown_s
+
+
+def _shots(page: Any) -> list[bytes]:
+    """Pictures of every ``SHOWN_EVERY``-th frame of the scene, from the first that is shown."""
+    first_s = _wait_for(page, 0.0)
+    page.execute_script("document.getElementById('play').click()")
+    time.sleep(0.5)  # what is on its way comes
+    first, shots = round(RATE_HZ * max(first_s, _time_s(page))), []
+    for frame in range(first + 1, LAST + 1):
+        page.execute_script(
+            f"window.filmMs = {1e3 * frame / RATE_HZ};document.getElementById('step').click()"
+        )
+        _wait_for(page, frame / RATE_HZ)
+        if frame % SHOWN_EVERY == 0:
+            page.execute_script("document.getElementById('answer').textContent = ''")
+            shots.append(_shot(page))
     return shots

@@ -168,8 +168,9 @@ def test_what_happens_to_the_line_is_one_line(event, line):
 BYTES = {  # 208 rows, 812 pixels, 16 electrodes; 16 bytes around a packet, one in 254 for stuffing
     Stream.RAW: 16 + 208 * 5 + 16 + 4,
     Stream.IMAGE: 104 + 812 * 4 + 16 + 13,
-    Stream.TOUCHES: 104 + 8 * 44 + 16 + 1,
+    Stream.TOUCHES: 104 + 8 * 60 + 16 + 2,
     Stream.EVENTS: 12 + 4 * 28 + 16,
+    Stream.DRIVE_TOUCHES: 16 * (20 + 40 + 16) + 4,
 }
 
 

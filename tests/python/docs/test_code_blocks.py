@@ -21,6 +21,7 @@ PAGES = (
     "docs/guide/import-and-doctor.md",
     pytest.param("docs/guide/scenes.md", marks=SCENES),
     pytest.param("docs/guide/shapes.md", marks=CLI),
+    pytest.param("docs/guide/surfaces.md", marks=CLI),
     pytest.param("docs/guide/build-a-skin.md", marks=CLI),
     pytest.param("docs/guide/teaching.md", marks=TEACHING),
     pytest.param("docs/guide/calibration.md", marks=CLI),

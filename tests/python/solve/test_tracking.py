@@ -10,6 +10,7 @@ import pytest
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
 from eitskin.core.results import Options
+from eitskin.errors import FrameError
 from eitskin.model.model import Model
 from eitskin.model.options import default_options, tracking
 from eitskin.scene.random_touches import TouchScene, TouchSet
@@ -144,3 +145,45 @@ def test_numpy_follows_nothing():
     core = made(default_options(prebuilt()[0]), engine="numpy")
     (one,) = core.stream(stream()[1][-1:])
     assert [touch.id for touch in one.touches] == [*range(1, 1 + len(one.touches))] != []
+
+
+def test_times_of_rows_follow_touches_through_the_scan():
+    """A touch that lands while a frame is scanned: by itself the frame has it elsewhere, or names
+    faults; with the times of its rows it is not solved, and no later frame shows the touch anywhere
+    else. The ids are those of drives."""
+    untouched_v, frames_v = stream()
+    before, after = untouched_v[0], frames_v[-1]
+    landing = before.copy()
+    landing[100:] = after[100:]  # rows are scanned in their order
+    times = np.arange(len(landing)) * 1e-4
+    core = made(options())
+    shown = [
+        core.follow(frame, times + 0.0208 * k)
+        for k, frame in enumerate([before] * 3 + [landing] + [after] * 6)
+    ]
+    assert not any(one.touches for one in shown[:3])
+    assert shown[3].info.found == ()
+    places = [place(touch) for touch in shown[-1].touches]
+    assert len(places) == 2 and all(touch.confirmed for touch in shown[-1].touches)
+    for one in shown[3:]:
+        for touch in one.touches:
+            assert min(np.hypot(*np.subtract(place(touch), true)) for true in places) < 6
+    assert min(touch.id for touch in shown[-1].touches) < 10
+
+
+@pytest.mark.parametrize("fields", [True, False], ids=["one-tare-frame", "no-fields"])
+def test_times_of_rows_need_fields_and_noise(fields):
+    """Without them frames are followed as they are."""
+    frame, times = stream()[1][-1], np.arange(208) * 1e-4
+    model = None if fields else replace(prebuilt()[0], fields=None)
+    timed, alone = made(options(), model), made(options(), model)
+    if fields:
+        timed.tare(stream()[0][0])
+        alone.tare(stream()[0][0])
+    for _ in range(2):
+        assert timed.follow(frame, times).touches == alone.follow(frame).touches
+
+
+def test_wrong_times_of_rows_are_refused():
+    with pytest.raises(FrameError, match="frame, times: of shape"):
+        made(options()).follow(stream()[1][-1][:-1], np.arange(207))

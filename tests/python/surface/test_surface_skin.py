@@ -175,3 +175,15 @@ def test_a_touch_is_found_on_the_ball(ball):
     assert np.linalg.norm(touch.point_m - wanted.point_m[0]) < 1e-3
     np.testing.assert_allclose(touch.normal, wanted.normal[0], atol=0.02)
     assert touch.radius_m == pytest.approx(9e-3, rel=0.1)
+
+
+def test_effects_that_deform_a_flat_skin_are_refused(tmp_path):
+    from eitskin.scene.compiler import prepare_scene
+    from eitskin.scene.description import scene_from_table
+
+    mesh = obj(tmp_path, *make_shape("saddle", 400))
+    described(tmp_path, mesh)
+    table = {"scene": {"skin": "skin.toml", "frames": 1}, "effects": {"stretch": {"strain": 0.1}}}
+    scene = scene_from_table(table, "here.toml", tmp_path)
+    with pytest.raises(EitskinError, match=r"effects.stretch\]: this effect is for flat skins"):
+        prepare_scene(scene)

@@ -330,6 +330,11 @@ export class SkinDrawing {
   }
 }
 
+// Three digits or more, and no power of ten.
+function inMillivolts(volts) {
+  return `${Number((1e3 * volts).toPrecision(3))} mV`;
+}
+
 export class VoltsDrawing {
   constructor(canvas) {
     this.canvas = canvas;
@@ -365,11 +370,11 @@ export class VoltsDrawing {
       context.moveTo(left, y(v));
       context.lineTo(width, y(v));
       context.stroke();
-      context.fillText(v ? `${(1e3 * v).toPrecision(3)} mV` : "0", left - 6, Math.max(8, y(v)));
+      context.fillText(v ? inMillivolts(v) : "0", left - 6, Math.max(8, y(v)));
     }
     context.textAlign = "left";
     context.textBaseline = "alphabetic";
-    const times = known && apart > 0 ? `; difference up to ${(1e3 * apart).toPrecision(3)} mV, × ${enlarged.toPrecision(2)}` : "";
+    const times = known && apart > 0 ? `; difference up to ${inMillivolts(apart)}, × ${enlarged.toPrecision(2)}` : "";
     context.fillText(`${volts.length} rows${times}`, left, height - 4);
     const line = (value, name, wide) => {
       context.strokeStyle = colour(name);

@@ -88,7 +88,7 @@ function follow(message, source) {
   plots.follow(message.touches || [], message.time_s);
   if (source !== page.shown) return;
   const { times } = page, last = times[times.length - 1];
-  if (last && message.time_s < last.time_s) times.length = 0;
+  if (last && (message.time_s < last.time_s || message.frame < last.frame)) times.length = 0;
   times.push({ at: performance.now(), frame: message.frame, time_s: message.time_s });
   while (times.length > 2 && times[0].at < performance.now() - 2000) times.shift();
   skin.follow(message.touches || [], message.time_s);
@@ -204,6 +204,7 @@ function showView() {
   $("flat-label").hidden = !deep;
   $("skin").hidden = page.deep;
   $("space").hidden = !page.deep;
+  $("trails-label").hidden = page.deep;
   $("skin").classList.toggle("pressable", page.may_press);
   const press = "Press the skin with mouse or finger, or with Enter and the arrow keys.";
   const turn = `Drag ${page.may_press ? "on a skin to press it, beside it to turn the view" : "to turn the view"}; wheel or two fingers zoom.`;
@@ -340,7 +341,7 @@ function draw() {
   $("n-frame").textContent = String(message.frame);
   $("n-time").textContent = `${message.time_s.toFixed(2)} s`;
   [$("n-rate").textContent, $("n-shown").textContent] = [0, 1].map((k) => rates()[k] ? `${rates()[k].toFixed(1)} Hz` : "–");
-  showTime(message.time_s, setup.length_s);
+  showTime(message.time_s, setup.length_s, setup.frame_us / 1e6);
   const solve_us = info ? info.solve_us + info.touch_us : 0;
   $("n-solve").textContent = solve_us ? `${(solve_us / 1e3).toFixed(1)} ms` : "–";
   const { peak } = page.images.get(page.shown) || { peak: 0 };
@@ -349,9 +350,10 @@ function draw() {
   sayTouches(touches);
 }
 
-function showTime(time_s, length_s) {
+// A recording that is looped goes on counting; ``frame_s`` lies between its end and its beginning.
+function showTime(time_s, length_s, frame_s) {
   if (!length_s) return;
-  const at = page.seeking ? Number($("at").value) : time_s > length_s ? time_s % length_s : time_s;
+  const at = page.seeking ? Number($("at").value) : time_s > length_s ? time_s % (length_s + frame_s) : time_s;
   if (!page.seeking) $("at").value = at;
   $("at-text").textContent = `${at.toFixed(1)} of ${length_s.toFixed(1)} s`;
 }
@@ -458,6 +460,7 @@ $("surface").addEventListener("keydown", (event) => {
   soon();
 });
 addEventListener("blur", () => {
+  if (!page.fingers.size) return;
   page.fingers.clear();
   press();
 });

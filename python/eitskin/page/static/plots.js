@@ -35,8 +35,8 @@ export class PlotsDrawing {
     const most = Math.max(...[...this.lines.values()].flat().map((at) => at[last] || 0), 1e-9);
     const [x0, y0, x1, y1] = box || [0, 0, 1, 1];
     const strips = [
-      { name: "x", title: "x, mm", low: x0, high: x1 },
-      { name: "y", title: "y, mm", low: y0, high: y1 },
+      { name: "x", title: "x, mm", low: Math.floor(x0), high: Math.ceil(x1) },
+      { name: "y", title: "y, mm", low: Math.floor(y0), high: Math.ceil(y1) },
       { name: last, title: forces ? "force, N" : "S mm²/m", low: 0, high: round(most) },
     ];
     const left = 56, end = this.times.length ? this.times[this.times.length - 1] : 0;

@@ -8,18 +8,19 @@ const VIEW = Math.PI / 5; // the camera's angle from top to bottom
 const TURN = Math.PI / 24; // by an arrow key
 const ELECTRODE_M = 0.007; // as wide as an electrode is drawn
 const ON_SKIN = 0.004; // nearer to the eye, in depths of the view
+const GLOW = 0.22; // of a skin that faces the eye, on a dark page
 const STRIDE = 9; // floats of a corner: place, normal (0: not lit), colour
 
 const SURFACE_SHADERS = [`
 attribute vec3 place, normal; attribute vec2 at; uniform mat4 camera;
 varying vec3 vPlace, vNormal; varying vec2 vAt;
 void main() { vPlace = place; vNormal = normal; vAt = at; gl_Position = camera * vec4(place, 1.0); }`, `
-precision mediump float; uniform sampler2D image; uniform vec3 eye, inside;
+precision mediump float; uniform sampler2D image; uniform vec3 eye, inside; uniform float glow;
 varying vec3 vPlace, vNormal; varying vec2 vAt;
 void main() {
   float facing = dot(normalize(vNormal), normalize(eye - vPlace));
   vec3 seen = facing < 0.0 ? mix(texture2D(image, vAt).rgb, inside, 0.7) : texture2D(image, vAt).rgb;
-  gl_FragColor = vec4(seen * (0.62 + 0.38 * abs(facing)), 1.0);
+  gl_FragColor = vec4(seen * (0.62 + 0.38 * abs(facing)) + glow * abs(facing), 1.0);
 }`];
 const SOLID_SHADERS = [`
 attribute vec3 place, normal, shade; uniform mat4 camera; uniform vec3 eye; uniform float size, lift;
@@ -284,6 +285,7 @@ export class SurfaceDrawing {
     gl.uniformMatrix4fv(surface.camera, false, camera);
     gl.uniform3fv(surface.eye, this.eye);
     gl.uniform3fv(surface.inside, shade("--line"));
+    gl.uniform1f(surface.glow, Math.max(...shade("--panel")) < 0.5 ? GLOW : 0);
     gl.bindBuffer(gl.ARRAY_BUFFER, shape.corners);
     attributes(gl, surface, { place: 3, normal: 3, at: 2 });
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, shape.indices);
@@ -436,7 +438,7 @@ function program(gl, [vertex, fragment]) {
     gl.attachShader(made, part);
   }
   gl.linkProgram(made);
-  const uniforms = ["camera", "eye", "inside", "size", "lift"].map((name) => [name, gl.getUniformLocation(made, name)]);
+  const uniforms = ["camera", "eye", "inside", "glow", "size", "lift"].map((name) => [name, gl.getUniformLocation(made, name)]);
   return { program: made, ...Object.fromEntries(uniforms) };
 }
 

@@ -108,12 +108,16 @@ def as_frames(
     rows = protocol.n_rows
     start = (frames[0] if frames else untouched[0]).time_us
     skin = {} if known is None else {"skin": skin_to_table(known.model.skin)}
+    row_time_s = np.zeros(rows)
+    row_time_s[protocol.scan_rows] = 1e-6 * info.slot_us * np.arange(rows)
+    row_time_s += info.samples / info.sample_rate_hz / 2
     result = Frames(
         protocol=protocol,
         voltage_v=np.array([raw.voltage_v for raw in frames], dtype=np.float64).reshape(-1, rows),
         reference_voltage_v=np.array([raw.voltage_v for raw in untouched], dtype=np.float64),
         frame_name=tuple(str(raw.frame) for raw in frames),
         time_s=np.array([((raw.time_us - start) % 2**32) / 1e6 for raw in frames]),
+        row_time_s=row_time_s if info.check_every == 1 else None,
         meta={
             "made_by": f"eitskin {__version__}, board {info.board} {info.serial}",
             "board": info.as_dict(),

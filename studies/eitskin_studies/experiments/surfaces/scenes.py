@@ -6,9 +6,9 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.fem.cem import ForwardModel
-from eitskin.fem.mesh import mesh_for_elements
+from eitskin.fem.mesh import lifted, mesh_for_elements
+from eitskin.scene.cover import Cover, with_touches
 from eitskin.scene.random_touches import TrueTouch
-from eitskin.scene.simulate import conductivity_with
 from eitskin.scene.streams import stream
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.placement import by_points
@@ -17,6 +17,7 @@ from eitskin.skin.skin import Skin, outline_on
 from eitskin.surface.outline import surface_map
 from eitskin.surface.shapes import make_shape
 from eitskin.surface.surface_map import SurfaceMap
+from eitskin_studies.experiments.experiment import SIMULATED_ELEMENTS
 
 MODEL_TRIANGLES, SCENE_TRIANGLES = 4000, 16_000
 ELECTRODES = 16
@@ -57,6 +58,12 @@ def same_on(name: str, surface: SurfaceMap, model_skin: Skin) -> Skin:
         ELECTRODES, model_skin.electrodes.width_mm, positions_mm=placed.positions_mm
     )
     return Skin(name, outline, electrodes, surface=surface)
+
+
+def flat_map(surface: SurfaceMap) -> SurfaceMap:
+    """The flattened copy of ``surface`` as a surface of its own, in the plane z = 0."""
+    flat = surface.flat_mm
+    return SurfaceMap(flat, np.column_stack([flat, np.zeros(len(flat))]), surface.triangles)
 
 
 def shape_map(name: str, triangles: int) -> SurfaceMap:
@@ -106,14 +113,17 @@ def on_copy(surface: SurfaceMap, touches: list[SpaceTouch]) -> tuple[TrueTouch, 
 def solved(
     skin: Skin,
     protocol: Protocol,
-    elements: int,
     contact_ohm_m2: FloatArray,
     scenes: list[tuple[TrueTouch, ...]],
+    thinner: SurfaceMap | None = None,
 ) -> dict[str, FloatArray]:
-    """``quiet`` (m,) and ``frames`` (k, m) in V."""
-    mesh = mesh_for_elements(skin, elements)
+    """``quiet`` (m,) and ``frames`` (k, m) in V. Where the skin was on the surface ``thinner``
+    before it was stretched, its thickness keeps the volume."""
+    mesh = mesh_for_elements(skin, SIMULATED_ELEMENTS)
     forward = ForwardModel(mesh, skin, protocol, contact_ohm_m2)
-    sheet = skin.conductivity_s_per_m
-    quiet = forward.voltages(np.full(mesh.n_elements, sheet))
-    frames = [forward.voltages(conductivity_with(mesh, one, sheet)) for one in scenes]
-    return {"quiet": quiet, "frames": np.array(frames)}
+    sheet = np.full(mesh.n_elements, skin.conductivity_s_per_m)
+    if thinner is not None:
+        sheet = sheet * lifted(mesh, thinner).true_areas_mm2 / mesh.true_areas_mm2
+    cover = Cover(mesh)
+    frames = [forward.voltages(with_touches(sheet, cover.change(one))) for one in scenes]
+    return {"quiet": forward.voltages(sheet), "frames": np.array(frames)}
