@@ -111,10 +111,10 @@ def found_touches(
     skin.set_options(tracking(default_options(skin.model)))
     skin.tare(untouched_v)
     skin.forget()
-    reported = []
+    reported, place = [], np.arange(frames_v.shape[1]) / frames_v.shape[1]
     for number, frame in enumerate(frames_v):
         try:
-            touches = skin.reconstruct(frame).touches
+            touches = skin.follow(frame, (number + place) / RATE_HZ).touches
         except FrameError:
             touches = ()
         reported.append(TouchedFrame(round(number * 1e6 / RATE_HZ), touches))
