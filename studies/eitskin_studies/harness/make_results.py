@@ -45,7 +45,9 @@ def commands() -> dict[str, list[str]]:
     some."""
     found = {}
     for name in EXPERIMENTS:
-        words = f"study {name} -o out/{name} --page {RESULTS}/{name}.md".split()
+        words, page = f"study {name} -o out/{name}".split(), f"{RESULTS}/{name}.md"
+        if (checkout_root() / page).is_file():
+            words += ["--page", page]
         if name in DATA:
             if not (folder := os.environ.get(DATA[name])):
                 continue
