@@ -18,6 +18,7 @@ API = pytest.mark.long("the README's Python, package/test_public.py, the tests o
 PAGES = (
     "README.md",
     pytest.param("docs/guide/tutorial.md", marks=CLI),
+    pytest.param("docs/guide/gallery.md", marks=CLI),
     "docs/guide/import-and-doctor.md",
     pytest.param("docs/guide/scenes.md", marks=SCENES),
     pytest.param("docs/guide/shapes.md", marks=CLI),
