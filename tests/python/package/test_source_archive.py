@@ -13,7 +13,7 @@ from test_wheel import ROOT
 
 from eitskin.config import load_toml
 
-MAX_BYTES = 3_200_000
+MAX_BYTES = 3_000_000
 
 
 @pytest.fixture(scope="module")
