@@ -91,6 +91,10 @@
  * it; smaller: fast drift is news */
 #define EITS_FAST_MAX_DRIFT R(0.01)
 
+/* with so many a drift of the gain is not named [touches]. larger: strong touches pass for drift;
+ * smaller: drift is named after the hand has lifted */
+#define EITS_FAST_HAND 3
+
 /* drift of which frames are named stale [of the gain]. larger: less is not named; smaller: so are
  * frames of presses at 40 dB */
 #define EITS_FAST_DRIFTED R(0.003)

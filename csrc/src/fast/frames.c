@@ -73,11 +73,12 @@ static void align_touch(eits_fast *fast, uint32_t k, eits_real *aligned)
     }
 }
 
-/* The gain is far from what it was at the tare, by more than noise makes of it. */
+/* The gain is far from what it was at the tare, by more than noise makes of it. Under a hand this
+ * is not known: what the model does not explain of several strong touches looks like drift. */
 static int is_far(const eits_fast *fast)
 {
     const eits_real drift = eits_fabs(fast->drift);
-    return drift > EITS_FAST_DRIFTED &&
+    return fast->count < EITS_FAST_HAND && drift > EITS_FAST_DRIFTED &&
            drift * fast->ctx->reference.v0_rms > EITS_FAST_DRIFTED_NOISE * fast->noise_v;
 }
 

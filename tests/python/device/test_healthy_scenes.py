@@ -10,8 +10,8 @@ from eitskin.session.assemble import read_frames
 from eitskin.session.frame import Frame
 
 QUICK = ("double_tap", "drum_beat", "hold", "tap", "two_touch")
-# five strong touches pass for drift of the gain while they are lifted
-KNOWN = {"grip": {"stale reference"}}
+# one frame, while five fingers land at once
+KNOWN = {"grip": {"crowded"}}
 
 
 def healthy() -> list[str]:
