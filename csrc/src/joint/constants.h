@@ -144,39 +144,6 @@
 /* least strength of the weaker [of the stronger]. as JOINT_SPLIT_FALL */
 #define EITS_JOINT_SPLIT_WEAKER R(0.25)
 
-/* two also stand where less is left, though that is more than noise: others may be wrong as well
- * [of the misfit over noise before]. larger: what is no touch is taken for some; smaller: frames
- * with two such pairs keep both */
-#define EITS_JOINT_SPLIT_MOST R(0.6)
-
-/* discs from which on missing touches are sought in what they leave, and not by splitting. larger:
- * missing touches stay missing; smaller: costs on fingers */
-#define EITS_JOINT_CROWD 5
-
-/* a crowd fits where the misfit is below [of the noise]. larger: crowds with a wrong touch are
- * reported; smaller: they cost a test, which often drops a touch */
-#define EITS_JOINT_CROWD_FITTED R(2.5)
-
-/* nothing is sought where the misfit is below [of the noise]. larger: missing touches stay missing;
- * smaller: costs */
-#define EITS_JOINT_SEARCHED R(1.25)
-
-/* nor where more is left [of the data's square]. larger: costs where the fit is far from any
- * minimum; smaller: several missing touches stay missing */
-#define EITS_JOINT_SEARCHABLE R(0.1)
-
-/* weaker candidates are not tried: the model's errors at the rim look like such [of a disc of the
- * expected radius]. larger: small touches stay missing; smaller: costs */
-#define EITS_JOINT_ADD_STRENGTH R(0.25)
-
-/* greatest strength with which a new disc begins [of a disc of the expected radius]. larger: it
- * takes up what others answer */
-#define EITS_JOINT_ADD_MOST R(2.0)
-
-/* in such a search a disc goes where F rises by less without it. larger: small touches go; smaller:
- * the solver's ripple stays */
-#define EITS_JOINT_NEEDED R(20.0)
-
 /* the data fit where the misfit is below [of the noise]. larger: a sheet that has drifted is taken
  * for touches; smaller: long fingers are not refined */
 #define EITS_JOINT_FITTED R(1.5)
@@ -225,9 +192,6 @@
 /* a joint fit begins no step after it has taken so many [multiply-accumulates]. larger: slow frames
  * with many touches; smaller: many touches are not settled */
 #define EITS_JOINT_WORK 800000
-
-/* a search begins no step after it has taken so many [multiply-accumulates]. as JOINT_WORK */
-#define EITS_JOINT_SEARCH_WORK 1500000
 
 /* trying one as two begins no step after it has taken so many [multiply-accumulates]. as
  * JOINT_WORK */

@@ -14,9 +14,9 @@ static int turn(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *macs)
 {
     eits_joint other = *j;
     other.shape[k] = eits_joint_as_other(&j->shape[k]);
-    eits_joint_free_one(&other, k);
-    eits_joint_free_one(j, k);
-    *macs += eits_joint_hold(ctx, j, 1);
+    other.free_count = 1;
+    other.free[0] = k;
+    eits_pole_clear(ctx, j->count);
     eits_joint_descend(ctx, &other, 2, R(INFINITY), macs);
     if (!(j->cost - other.cost > EITS_JOINT_SETTLED))
         return 0;

@@ -21,7 +21,7 @@ static eits_shape shape_of(const eits_context *ctx, const eits_disc *d)
 /* The fit's discs as shapes, each of the strength that was found. */
 static eits_joint begin(const eits_context *ctx, const eits_fit *f)
 {
-    eits_joint j = {.count = f->count, .parameters = EITS_JOINT_DISC, .searches = 0};
+    eits_joint j = {.count = f->count, .parameters = EITS_JOINT_DISC};
     for (uint32_t k = 0; k < f->count; ++k) {
         j.from[k] = k;
         j.shape[k] = shape_of(ctx, &f->disc[k]);
@@ -200,10 +200,8 @@ static int any_may_be_one(const eits_context *ctx, const eits_joint *j,
 static int is_clear(const eits_context *ctx, const eits_joint *j, const eits_joint_known *known,
                     uint32_t fewer)
 {
-    const eits_real excess = eits_joint_excess(ctx, j), fitted = j->count < EITS_JOINT_CROWD
-                                                                     ? EITS_JOINT_FITTED
-                                                                     : EITS_JOINT_CROWD_FITTED;
-    if (!(excess < fitted) ||
+    const eits_real excess = eits_joint_excess(ctx, j);
+    if (!(excess < EITS_JOINT_FITTED) ||
         (fewer > 0 && j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT))
         return 0;
     for (uint32_t k = 0; k < j->count; ++k) {
@@ -217,11 +215,9 @@ static int is_clear(const eits_context *ctx, const eits_joint *j, const eits_joi
 
 /* Fit the discs of `f` jointly, in *j, those that may be parts of one as one. Returns whether that
  * needs no test; else j->count is 0 unless *j has the discs as they are, settled. */
-static int fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j,
-                       eits_joint_known *known)
+static int fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j, eits_joint_known *known)
 {
     *j = begin(ctx, f);
-    j->searches = 1;
     if (!f->settled)
         leave_out_weak(ctx, j);
     const uint32_t fewer = eits_joint_merge(j);
@@ -229,7 +225,7 @@ static int fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit 
     if (j->count > 0 && j->count * j->parameters <= EITS_JOINT_PARAMETERS) {
         if (fewer == 0)
             eits_joint_guess_kinds(ctx, j);
-        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, scratch, j);
+        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, j);
         if (explains(ctx, j)) {
             f->macs += eits_joint_places(ctx, j, known);
             clear = is_clear(ctx, j, known, fewer) && !any_may_be_one(ctx, j, known);
@@ -263,12 +259,12 @@ void eits_joint_give(const eits_context *ctx, const eits_joint *j, eits_fit *f)
     }
 }
 
-int eits_fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j)
+int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j)
 {
     eits_joint_known known[EITS_MAX_TOUCHES];
     j->count = 0;
     eits_pole_forget(ctx);
-    if (!may_fit(ctx, f) || !fit_clearly(ctx, scratch, f, j, known))
+    if (!may_fit(ctx, f) || !fit_clearly(ctx, f, j, known))
         return 0;
     const eits_real excess = eits_joint_excess(ctx, j);
     report(ctx, j, known, f);
@@ -295,7 +291,7 @@ static int same_touches(const eits_context *ctx, const eits_fit *f, const eits_j
     return same;
 }
 
-void eits_fit_jointly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j)
+void eits_fit_jointly(eits_context *ctx, eits_fit *f, eits_joint *j)
 {
     eits_joint_known known[EITS_MAX_TOUCHES];
     if (!f->tested || !may_fit(ctx, f))
@@ -303,7 +299,7 @@ void eits_fit_jointly(eits_context *ctx, const eits_scratch *scratch, eits_fit *
     if (!same_touches(ctx, f, j)) {
         *j = begin(ctx, f);
         eits_joint_guess_kinds(ctx, j);
-        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, scratch, j);
+        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, j);
     }
     if (!explains(ctx, j) || (f->drifts && eits_joint_excess(ctx, j) > EITS_JOINT_FITTED))
         return;

@@ -12,7 +12,7 @@ from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.options_table import ALL_TOUCH_FIT, JOINT
 from eitskin.oracle.round_skin import RoundSkin
-from eitskin.scene.random_touches import TouchRules, TouchScene, TrueTouch, random_touches
+from eitskin.scene.random_touches import TouchRules, TouchScene, random_touches
 from eitskin.scoring.matching import Matching, match
 from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
@@ -38,24 +38,23 @@ class Frames:
     touched_v: FloatArray
 
 
-def measured(scene: TouchScene, number: int, snr_db: float = SNR_DB, bits: int = BITS) -> Frames:
-    skin = paper_skin()
-    draw = np.random.default_rng([SEED, number])
-    spread = np.exp(CONTACT_SPREAD * draw.standard_normal(skin.electrodes.count))
-    contacts = skin.electrodes.contact_impedance_ohm_m2 * spread
-    exact = RoundSkin(skin, prebuilt()[0].protocol, contacts)
-    untouched_v, touched_v = exact.voltages([]), exact.voltages(scene.touches)
-    read = np.vstack([np.tile(untouched_v, (TARE_FRAMES, 1)), touched_v])
-    sigma_v = np.sqrt((untouched_v**2).mean()) * 10 ** (-snr_db / 20)
-    step_v = 2.5 * np.abs(untouched_v).max() / 2**bits
-    read = np.round((read + sigma_v * draw.standard_normal(read.shape)) / step_v) * step_v
-    return Frames(scene, read[:-1], read[-1])
-
-
 @cache
 def frames(kind: str) -> tuple[Frames, ...]:
-    rules = random_touches(paper_skin().outline, SEED, SCENES, f"joint {kind}", KINDS[kind])
-    return tuple(measured(scene, number) for number, scene in enumerate(rules.scenes))
+    skin, made = paper_skin(), []
+    electrodes = skin.electrodes
+    rules = random_touches(skin.outline, SEED, SCENES, f"joint {kind}", KINDS[kind])
+    for number, scene in enumerate(rules.scenes):
+        draw = np.random.default_rng([SEED, number])
+        spread = np.exp(CONTACT_SPREAD * draw.standard_normal(electrodes.count))
+        contacts = electrodes.contact_impedance_ohm_m2 * spread
+        exact = RoundSkin(skin, prebuilt()[0].protocol, contacts)
+        untouched_v, touched_v = exact.voltages([]), exact.voltages(scene.touches)
+        read = np.vstack([np.tile(untouched_v, (TARE_FRAMES, 1)), touched_v])
+        sigma_v = np.sqrt((untouched_v**2).mean()) * 10 ** (-SNR_DB / 20)
+        step_v = 2.5 * np.abs(untouched_v).max() / 2**BITS
+        read = np.round((read + sigma_v * draw.standard_normal(read.shape)) / step_v) * step_v
+        made.append(Frames(scene, read[:-1], read[-1]))
+    return tuple(made)
 
 
 def found_by(
@@ -129,23 +128,3 @@ def test_light_and_insulating_touches_have_their_radii(kind, median_mm, bias_mm,
     assert np.median(np.abs(radii)) <= size_mm
     assert 0 < len(known) < len(radii)  # of others the data do not tell the radius
     assert np.sqrt(np.mean(np.square(known))) <= 2
-
-
-# Eight discs: x, y, radius in mm, contrast. The image shows seven; the first one is small, and its
-# neighbours take up what it answers.
-CROWD = (
-    (-12.4, -28.7, 6.1, 9.8), (-14.1, 71.1, 11.2, 5.4), (-38.0, 1.5, 11.0, 8.3),
-    (43.3, -49.8, 8.0, 3.4), (3.0, 33.9, 8.7, 9.3), (-17.3, -66.2, 9.8, 7.2),
-    (28.3, -12.9, 7.0, 7.4), (40.3, 40.0, 9.5, 3.8),
-)  # fmt: skip
-
-
-def test_a_touch_that_the_image_does_not_show_is_sought():
-    scene = TouchScene("crowd", tuple(TrueTouch(*numbers) for numbers in CROWD))
-    one = measured(scene, 0, snr_db=80.0, bits=16)
-    solver = Reconstructor(prebuilt()[0])
-    solver.tare(one.untouched_v)
-    found = solver.reconstruct(one.touched_v).touches
-    matched = match(scene.centres_mm(), [(t.x_mm, t.y_mm) for t in found])
-    assert matched.exact
-    assert max(matched.distances_mm) < 2
