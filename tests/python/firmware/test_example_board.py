@@ -74,7 +74,7 @@ def check(image: Path, machine: str) -> None:
         twin = HostTwin(KnownModel(model, blob), board_options(model, device.board), device.board)
         for raw in tared(device):
             twin.take(Frame(raw.frame, 0, raw.time_us, raw=raw))
-        frames, pressed, until = [], 0, time.monotonic() + 60
+        frames, pressed, until = [], 0, time.monotonic() + 240
         for frame in assembled(device.stream(ALL), ALL):
             if isinstance(frame, Frame) and frame.raw is not None:
                 twin.take(frame)
