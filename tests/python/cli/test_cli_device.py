@@ -45,7 +45,7 @@ def test_two_touches_within_two_millimetres_of_the_scene(done, tmp_path, monkeyp
         errors = [float(error) for error in OFF_BY.findall(line)]
         assert len(errors) == 2, line
         worst.append(max(errors))
-    # Places are those of each frame, not smoothed: at 60 dB one frame of twenty may be a little off.
+    # Places are those of each frame, not smoothed: at 60 dB one frame of twenty may be 2.5 mm off.
     assert sorted(worst)[-2] < 2.0 and max(worst) < 2.5, worst
     assert lines[20].startswith(
         "20 frames, 20.0 a second of the board's time; 0 gaps (0 packets missing)"
