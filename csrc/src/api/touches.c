@@ -81,7 +81,7 @@ static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fi
         eits_fit_jointly(ctx, f, &j);
 }
 
-/* Which image shows the frame: the touches' if they explain it. */
+/* Return which image shows the frame: that of the touches if they explain it. */
 static eits_shown shown(const eits_context *ctx, const eits_fit *f, const eits_touch *found,
                         uint32_t count)
 {

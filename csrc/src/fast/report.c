@@ -64,8 +64,8 @@ static int is_finite(const fast_seen *s)
            eits_all_finite(variance, 3);
 }
 
-/* What is known of a touch, with what was found of it. Where that would be no number, it starts
- * again. */
+/* Return the state of a touch, corrected by what was found of it. It starts again if a number of
+ * the state is not finite. */
 static fast_seen updated(const eits_fast *fast, const fast_seen *before, const eits_touch *found)
 {
     const fast_seen begun = start(fast, found);

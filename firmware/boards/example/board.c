@@ -1,4 +1,4 @@
-/* What this board has, for the application. */
+/* This file tells the application what the board has. */
 #include "example.h"
 
 enum { WORKSPACE_BYTES = 512 * 1024, SOURCE_UA_RMS = 707 };

@@ -114,14 +114,14 @@ class PageCommands:
             self._reader.again(time_s)
             return f"from {time_s:.1f} s"
 
-        def action(device: Device) -> str:
-            recording.seek(time_s)
-            return f"from {time_s:.1f} s"
-
         if not isinstance(session, Session):
             raise UsageError(f"{session.name} is a robot: view the recording of one skin alone")
-        recording = session
-        return recording.ask(action)
+
+        def action(device: Device) -> str:
+            session.seek(time_s)
+            return f"from {time_s:.1f} s"
+
+        return session.ask(action)
 
     def recording(self) -> Path:
         """The recording that is shown, or the last one that was made here."""

@@ -97,8 +97,8 @@ def _recording(whole: AnySession) -> str | None:
 
 
 def _one(name: str, session: Session, base: Pose | None) -> dict[str, Any]:
-    """What differs from skin to skin; ``pose`` and ``link_pose`` are 4 by 4, of the skin's drawing
-    and of its link in the robot's frame."""
+    """Return the facts that differ from skin to skin. ``pose`` and ``link_pose`` are 4 by 4: the
+    poses of the skin's drawing and of its link in the robot's frame."""
     placement, link = session.placement, base or IDENTITY
     pose = link if placement is None else link @ placement.pose
     return {

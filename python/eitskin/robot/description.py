@@ -209,7 +209,7 @@ def _device(url: str, folder: Path, where: str) -> str:
 
 
 def _port(url: str) -> str | None:
-    """What only one board can be at; None for what may be opened several times."""
+    """Return the port that only one board can be at; None for a device that may be opened twice."""
     scheme, _, rest = url.partition(":")
     if scheme in TIMED:
         return None

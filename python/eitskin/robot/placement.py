@@ -65,8 +65,8 @@ class PlacedTouch:
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Where a skin is in the frame of ``link``: the ``pose`` of its drawing, with z out of the
-    skin; of a ``surface`` the pose of its mesh."""
+    """The place of a skin in the frame of ``link``. ``pose`` is that of its drawing, with z out of
+    the skin; of a ``surface`` it is that of its mesh."""
 
     link: str
     pose: Pose = IDENTITY

@@ -25,7 +25,7 @@ class Pose:
         return np.asarray(np.asarray(points_m) @ self.rotation.T + self.translation_m)
 
     def __matmul__(self, inner: "Pose") -> "Pose":
-        """Where the frame is that ``inner`` places in this pose's first frame."""
+        """Return the pose of the frame that ``inner`` places in this pose's first frame."""
         return Pose(self.rotation @ inner.rotation, self.points(inner.translation_m))
 
     def matrix(self) -> FloatArray:

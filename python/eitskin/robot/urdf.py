@@ -1,4 +1,4 @@
-"""What a robot file needs of a URDF: the names of links, where they are while all joints are at
+"""Read what a robot file needs of a URDF: the names of links, their places while all joints are at
 zero, and the elements  <eitskin reference="LINK" device="URL">  that name skins."""
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Where a touch sees the elements of a mesh: on the plane, or around it on a surface."""
+"""A mesh's elements as a touch sees them: on the plane, or around it on a surface."""
 
 import numpy as np
 

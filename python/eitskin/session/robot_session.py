@@ -346,7 +346,7 @@ class RobotSession:
         self.close()
 
     def close(self, reason: str = "") -> None:
-        """Let go of all boards and recordings; may be called twice."""
+        """Close all boards and recordings. It may be called twice."""
         self.stop()
         self._join()
         for skin in self._skins:
@@ -367,7 +367,7 @@ class RobotSession:
 
     @property
     def bases(self) -> dict[str, Pose]:
-        """Where the links of the skins are in the robot's frame, with all joints at zero."""
+        """The poses of the skins' links in the robot's frame, with all joints at zero."""
         return {one.name: one.base for one in self.robot.skins}
 
     @property
@@ -485,7 +485,7 @@ class RobotSession:
         return all_of(answers)
 
     def messages(self) -> Generator[Message, None, None]:
-        """What comes from all skins, until all scenes, recordings or numbers of frames are over."""
+        """Yield all skins' messages, until all scenes, recordings or numbers of frames are over."""
         advice = "RobotSession.stop() ends it from any thread"
         return OneThreadAtATime(self._messages(), "the robot's messages", advice)
 
@@ -544,7 +544,7 @@ class RobotSession:
         over: bool = False,
         error: BaseException | None = None,
     ) -> None:
-        """How far a skin's thread is."""
+        """Take note that a skin's thread has started, is over or has failed."""
         with self.lock:
             skin.started = skin.started or started
             skin.over = skin.over or over

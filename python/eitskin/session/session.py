@@ -172,7 +172,7 @@ class Session:
 
     @property
     def placement(self) -> Placement | None:
-        """Where the skin is on its robot's link; None: it is flat, and no robot file says it."""
+        """The place of the skin on its robot's link; None for a flat skin that no robot file places."""
         how, surface = self.settings, None if self.known is None else self.known.model.surface
         if how.pose is None and surface is None:
             return None
@@ -186,7 +186,7 @@ class Session:
 
     @property
     def bases(self) -> "dict[str, Pose]":
-        """Where the links of the skins are in the robot's frame; of one device unknown."""
+        """The poses of the skins' links in the robot's frame; none are known of one device."""
         return {}
 
     @property

@@ -136,8 +136,8 @@ def _contact(touch: ros2.Table) -> ros2.Table:
 
 
 def placed(touch: ros2.Table) -> ros2.Table:
-    """Where a touch of a message is in its link's frame; in the skin's own where the message does
-    not say it."""
+    """Return the place of a touch in its link's frame, or in the skin's own if the message does not
+    have the former."""
     if "position_m" in touch:
         return touch
     facts = {name: touch.get(name) for name in ("x_mm", "y_mm", *ros2.COVARIANCE)}

@@ -87,14 +87,14 @@ T = TypeVar("T")
 
 
 class OfSkin(Generic[T]):
-    """What a sink keeps for each skin: ``make`` of its source, and ``of`` a message."""
+    """One thing that a sink keeps for each skin: ``make`` makes it of a source, ``of`` finds it."""
 
     def __init__(self, source: TouchSource, make: Callable[[TouchSource], T]) -> None:
         self.kept = {name: make(one) for name, one in source.each.items()}
         self._only = next(iter(self.kept.values())) if len(self.kept) == 1 else None
 
     def of(self, message: dict[str, Any]) -> T | None:
-        """What is kept for the skin of ``message``; None for a robot's summary."""
+        """Return what is kept for the skin of ``message``; None for a robot's summary."""
         return self._only or self.kept.get(message.get("source"))
 
 

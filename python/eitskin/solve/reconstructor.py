@@ -86,7 +86,7 @@ class Reconstructor:
         engine_of_c = self.c_engine
         self._tracker = None if engine_of_c is None else FastCore(engine_of_c)
         self._begun = False  # drives are followed
-        self._found: Sequence[Touch] | None = None  # in the last frame, not told to the tracker yet
+        self._found: Sequence[Touch] | None = None  # the tracker gets them at the next frame
         self._streams = OneReader("the touches of this Reconstructor's stream", OTHERS)
         self._options = default_options(model)
         self.set_options(options or self._options)

@@ -83,15 +83,21 @@ def nearest_on_segments(
     """Return the segment (k,) nearest to each of ``points`` (k, d) among those from ``begin`` to
     ``end`` (b, d), and how far along it the nearest place is, from 0 to 1, (k,)."""
     step = end - begin
-    square = np.maximum((step**2).sum(axis=1), 1e-300)
     segment = np.zeros(len(points), dtype=np.int64)
     share = np.zeros(len(points))
     for k, point in enumerate(points):
-        along = np.clip(((point - begin) * step).sum(axis=1) / square, 0.0, 1.0)
-        away = ((begin + along[:, None] * step - point) ** 2).sum(axis=1)
-        segment[k] = np.argmin(away)
+        along, square = _along(point, begin, step)
+        segment[k] = np.argmin(square)
         share[k] = along[segment[k]]
     return segment, share
+
+
+def _along(point: FloatArray, begin: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how far along each segment from ``begin`` by ``step`` (b, d) its place nearest to
+    ``point`` (d,) is, from 0 to 1, and the square of the distance to that place, both (b,)."""
+    length = np.maximum((step**2).sum(axis=1), 1e-300)
+    share = np.clip(((point - begin) * step).sum(axis=1) / length, 0.0, 1.0)
+    return share, ((begin + share[:, None] * step - point) ** 2).sum(axis=1)
 
 
 def nearest_on_triangles(
@@ -129,9 +135,7 @@ def _nearest_weights(point: FloatArray, corners: FloatArray) -> FloatArray:
     for first in range(3):
         last = (first + 1) % 3
         begin, step = corners[outside, first], corners[outside, last] - corners[outside, first]
-        square = np.maximum((step**2).sum(axis=1), 1e-300)
-        share = np.clip(((point - begin) * step).sum(axis=1) / square, 0.0, 1.0)
-        away = ((begin + share[:, None] * step - point) ** 2).sum(axis=1)
+        share, away = _along(point, begin, step)
         wins = away < best
         best[wins] = away[wins]
         own = np.zeros((int(wins.sum()), 3))

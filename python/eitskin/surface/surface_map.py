@@ -57,23 +57,6 @@ class SurfaceTouch:
     covariance_m2: FloatArray | None
     long_axis_m: FloatArray | None
 
-    def pose(self) -> FloatArray:
-        """Return the rotation with the columns t1, t2 and normal, and the point in m, (3, 4)."""
-        return np.column_stack([self.tangents, self.normal, self.point_m])
-
-    def quaternion_xyzw(self) -> FloatArray:
-        """Return the rotation with the columns t1, t2 and normal as a unit quaternion, (4,)."""
-        r = self.pose()[:, :3]
-        # The products of the quaternion with itself, times 4; the column of its greatest component
-        # is the most accurate (Shepperd, J. Guidance and Control 1, 1978).
-        both, turn = r + r.T, np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-        products = np.empty((4, 4))
-        products[:3, :3] = both + (1 - np.trace(r)) * np.eye(3)
-        products[:3, 3] = products[3, :3] = turn
-        products[3, 3] = 1 + np.trace(r)
-        greatest = products[int(np.argmax(np.diag(products)))]
-        return np.asarray(greatest / np.linalg.norm(greatest))
-
 
 @dataclass(frozen=True, eq=False)
 class SurfaceMap:

@@ -1,4 +1,4 @@
-"""What a triangulation must be to be a skin: one piece, a disk, triangles with an area."""
+"""Check that a triangulation can be a skin: one piece, a disk, triangles with an area."""
 
 import numpy as np
 

@@ -115,7 +115,7 @@ def _name_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]], least:
 
 
 def _legend(axes: Axes, every: Sequence[Reached], named: bool) -> None:
-    """What markers mean, and colours where lines have no names."""
+    """Draw a legend of the markers, and of the colours if lines have no names."""
     line = load_matplotlib().lines.Line2D
     ours = list(dict.fromkeys(one.name for one in every if one.ours))
     entries = {} if named else {name: _style(name, ours)[0] for name in (*ours, *NAMED)}

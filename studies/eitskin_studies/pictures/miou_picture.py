@@ -1,4 +1,4 @@
-"""What MIoU measures, as a drawing, and images of one scene near MIoU .75, .85 and .95."""
+"""A drawing of what MIoU measures, and images of one scene near MIoU .75, .85 and .95."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def draw_miou(path: Path, progress: Progress = silent) -> None:
 
 
 def _distance(images: Sequence[_Shown]) -> float:
-    """How far a scene's images are from ``TARGETS``."""
+    """Return the distance of a scene's images from ``TARGETS``."""
     return sum((one.miou - TARGETS[one.name]) ** 2 for one in images)
 
 

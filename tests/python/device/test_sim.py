@@ -27,7 +27,7 @@ ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 
 def test_frames_and_results_are_those_of_the_host_core_bit_for_bit():
-    """Of every second frame, whose touches are followed from frame to frame."""
+    """The touches of every second frame are followed from frame to frame."""
     model, blob = prebuilt()
     with sim_device() as device:
         device.send_command(cmd.StreamCommand(Stream.RAW), 1.0)

@@ -17,8 +17,8 @@ FLICKER, LIFT, MISSING = "time/tracked-flicker", "time/tracked-lift", "time/trac
 
 
 def options(**changes: object) -> Options:
-    """Those of streams; the linear answers of these frames are not a sheet's, so that nothing else
-    is looked for."""
+    """Return the options of streams, without diagnostics: the linear answers of these frames are
+    not a sheet's."""
     return replace(tracking(default_options(small_model())), diagnostics=0, **changes)
 
 

@@ -85,7 +85,7 @@ class Page:
         return bool(self.get(name, "checkVisibility()"))
 
     def box(self, name: str) -> dict[str, float]:
-        """Where an element is in the window, in CSS pixels."""
+        """Return the place of an element in the window, in CSS pixels."""
         return dict(self.get(name, "getBoundingClientRect().toJSON()"))
 
     def click(self, name: str) -> None:

@@ -1,4 +1,4 @@
-"""Where touches of a robot go: each skin has its topics and its source, and places are in the frame
+"""Touches of a robot in sinks: each skin has its topics and its source, and places are in the frame
 of its link."""
 
 import csv

@@ -56,7 +56,7 @@ def made(chosen: Options, model: Model | None = None, engine: str = "c64") -> Re
 
 
 def reported(chosen: Options, model: Model | None = None) -> list[tuple[Touch, ...]]:
-    """Of each frame, by the C core in double."""
+    """Return the touches of each frame, by the C core in double."""
     return [one.touches for one in made(chosen, model).stream(stream()[1])]
 
 

@@ -10,6 +10,7 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import ModelError
 from eitskin.model.eitm import HEADER, decode_model, encode_model
+from eitskin.robot.pose import quaternion_xyzw
 from eitskin.surface.flatten import flattened
 from eitskin.surface.section import decode_surface, encode_surface
 from eitskin.surface.shapes import make_shape
@@ -105,7 +106,7 @@ def test_a_touch_comes_in_metres_with_its_covariance(ball):
     assert np.trace(found.covariance_m2) == pytest.approx(spread * 1e-6 * found.scale**2)
     np.testing.assert_allclose(found.covariance_m2 @ found.normal, 0.0, atol=1e-15)
     assert np.linalg.norm(found.long_axis_m) == pytest.approx(6e-3 * found.scale)
-    x, y, z, w = found.quaternion_xyzw()
+    x, y, z, w = quaternion_xyzw(np.column_stack([found.tangents, found.normal]))
     turned = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
     np.testing.assert_allclose(turned, found.normal, atol=1e-12)
     assert ball.touch(Touch(1, 0.0, 0.0, 4.0, 0.5, 0.9)).covariance_m2 is None

@@ -6,7 +6,7 @@ const PLACE_90 = 4.605; // chi-squared of two numbers that 90 % lie below
 
 const ID_COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7b4fa3"];
 
-// The colour of a touch in the table, on the skin and in the plots; told apart by colour-blind eyes.
+// A touch has this colour in the table, on the skin and in the plots. Colour-blind eyes can tell them apart.
 export function idColour(id) {
   return ID_COLOURS[(id - 1) % ID_COLOURS.length] || ID_COLOURS[0];
 }

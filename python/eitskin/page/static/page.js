@@ -384,7 +384,7 @@ function press() {
   send({ type: "do", do: "press", value: Object.fromEntries(fingersBySkin()) });
 }
 
-// Where this page's fingers press, by the names of the skins.
+// The places that this page's fingers press, by the names of the skins.
 function fingersBySkin() {
   const places = new Map();
   for (const { source, place } of page.fingers.values()) places.set(source, [...(places.get(source) || []), place].slice(0, MAX_FINGERS));

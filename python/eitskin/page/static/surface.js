@@ -97,7 +97,7 @@ class SkinShape {
     this.sort();
   }
 
-  // Which triangles reach into each cell of the plane.
+  // Each cell of the plane knows the triangles that reach into it.
   sort() {
     const xs = this.flat.map((p) => p[0]), ys = this.flat.map((p) => p[1]);
     const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
@@ -139,7 +139,7 @@ class SkinShape {
     return { point: moved(this.link, touch.position_m), normal: turned(this.link, touch.normal) };
   }
 
-  // Where a ray first meets the skin: how far away, and the place of the drawing.
+  // A ray first meets the skin at this distance, and at this place of the drawing.
   meet(from, along) {
     let met = null;
     for (const triangle of this.triangles) {
