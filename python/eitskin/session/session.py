@@ -172,7 +172,7 @@ class Session:
 
     @property
     def placement(self) -> Placement | None:
-        """The place of the skin on its robot's link; None for a flat skin that no robot file places."""
+        """The place of the skin on its link; None for a flat skin that no robot file places."""
         how, surface = self.settings, None if self.known is None else self.known.model.surface
         if how.pose is None and surface is None:
             return None
