@@ -28,7 +28,7 @@ import numpy as np
 
 from eitskin import __version__
 from eitskin.device.wire.link_table import Stream
-from eitskin.robot.pose import IDENTITY, Pose
+from eitskin.kinematics.pose import IDENTITY, Pose
 from eitskin.session.frame import Frame
 from eitskin.session.message import encoded
 from eitskin.session.robot_session import AnySession

@@ -11,8 +11,8 @@ from typing import Any
 from eitskin.config import check_keys, load_toml, nearest, number, subtable, word
 from eitskin.device.timing import TIMED, Timing, check_name, split_name, split_timing
 from eitskin.errors import ConfigError, EitskinError, GeometryError, UsageError
-from eitskin.robot.pose import IDENTITY, Pose, from_quaternion, from_rpy
-from eitskin.robot.urdf import Urdf, load_urdf
+from eitskin.kinematics.pose import IDENTITY, Pose, from_quaternion, from_rpy
+from eitskin.kinematics.urdf import Urdf, load_urdf
 
 SCHEME = "robot:"
 SUFFIXES = (".toml", ".urdf")

@@ -7,7 +7,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
-from eitskin.robot.pose import IDENTITY, Pose, quaternion_xyzw
+from eitskin.kinematics.pose import IDENTITY, Pose, quaternion_xyzw
 from eitskin.surface.surface_map import SurfaceMap
 
 

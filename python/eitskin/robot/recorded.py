@@ -7,8 +7,8 @@ from pathlib import Path
 
 from eitskin.errors import FileError
 from eitskin.fileio import read_bytes, write_bytes
+from eitskin.kinematics.pose import quaternion_xyzw
 from eitskin.robot.description import Robot, RobotSkin
-from eitskin.robot.pose import quaternion_xyzw
 
 FILE = "robot.toml"
 

@@ -22,8 +22,8 @@ from eitskin.device.pacing import Pacer, WallClock
 from eitskin.device.recordings.recording import Recorder
 from eitskin.device.timing import check_speed
 from eitskin.errors import DeviceError, EitskinError, FileError, UsageError
+from eitskin.kinematics.pose import Pose
 from eitskin.robot.description import Robot, RobotSkin, is_robot, looped, open_robot
-from eitskin.robot.pose import Pose
 from eitskin.robot.recorded import begin_folder, skin_file, write_recorded
 from eitskin.session.frame import DriveReport, Frame, Message, Notice
 from eitskin.session.observer import Observer

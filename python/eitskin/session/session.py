@@ -29,8 +29,8 @@ from eitskin.device.timing import check_name, check_speed, is_name, split_name, 
 from eitskin.device.transport import Capabilities
 from eitskin.device.wire.link_table import Setting, Stream
 from eitskin.errors import UsageError
+from eitskin.kinematics.pose import IDENTITY, Pose
 from eitskin.robot.placement import Placement
-from eitskin.robot.pose import IDENTITY, Pose
 from eitskin.session.assemble import Assembler, Clock
 from eitskin.session.frame import DriveReport, Frame, Message, Notice
 from eitskin.session.gestures import StreamGestures

@@ -12,7 +12,7 @@ from eitskin.device.settings import ScanSettings, SolverSettings
 from eitskin.device.wire.link_table import Stream
 from eitskin.device.wire.packets import BoardInfo
 from eitskin.errors import UsageError
-from eitskin.robot.pose import Pose
+from eitskin.kinematics.pose import Pose
 from eitskin.tuning.for_model import operating_point_for, settings_text
 from eitskin.tuning.front import REPORT_US, Preset, board_takes
 

@@ -26,7 +26,7 @@ from eitskin.skin.uncertainty import (
     uncertainty_from_table,
     uncertainty_to_table,
 )
-from eitskin.surface.covered import CoveredSurface, covered_surface
+from eitskin.surface.covered import CoveredSurface, covered_link, covered_surface
 from eitskin.surface.outline import rim_circle, simplified
 from eitskin.surface.surface_map import SurfaceMap
 
@@ -309,6 +309,14 @@ def _surface_of(sheet: Mapping[str, Any], where: str, folder: Path | None) -> Co
                 raise ConfigError(f"{where}: {key} goes with surface = a mesh file; remove it")
         return None
     path = _file_of(sheet, "surface", "a mesh", where, folder)
+    file, _, link = str(sheet["surface"]).partition("#")
+    if file.lower().endswith(".urdf"):
+        for key in SURFACE_KEYS:
+            if key in sheet:
+                raise ConfigError(
+                    f"{where}: {key} goes with a mesh file; remove it, a URDF says it"
+                )
+        return covered_link(_file_of({"surface": file}, "surface", "a URDF", where, folder), link)
     unit = choice(sheet, "surface_unit", "mm", ("mm", "m"), where)
     return covered_surface(path, unit, _word(sheet, "link", where) or "")
 

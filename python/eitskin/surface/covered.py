@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from eitskin.arrays import FloatArray
-from eitskin.errors import GeometryError
+from eitskin.errors import FileError, GeometryError
+from eitskin.kinematics.link_mesh import LinkMesh, link_mesh
 from eitskin.surface.surface_map import SurfaceMap
 
 
@@ -56,12 +57,31 @@ def covered_surface(path: Path, unit: str, link: str) -> CoveredSurface:
     Raises:
         FileError, GeometryError, MissingExtraError: as ``read_surface`` and ``surface_map``.
     """
+    return _covered(path, unit, link, str(path))
+
+
+def covered_link(urdf: Path, name: str) -> CoveredSurface:
+    """Read the surface that is the mesh of a link, in the link's frame, and flatten it; ``name`` is
+    as of ``link_mesh``.
+
+    Raises:
+        FileError, ConfigError, GeometryError, MissingExtraError: as ``link_mesh``,
+            ``read_surface`` and ``surface_map``.
+    """
+    mesh = link_mesh(urdf, name)
+    try:
+        return _covered(mesh, "m", mesh.link, str(mesh.file))
+    except (FileError, GeometryError) as error:
+        raise type(error)(f"{urdf}: link {mesh.link!r}: {error}") from None
+
+
+def _covered(source: Path | LinkMesh, unit: str, link: str, where: str) -> CoveredSurface:
     from eitskin.surface.mesh_file import read_surface
     from eitskin.surface.outline import surface_map
 
-    read = read_surface(path, unit)
+    read = read_surface(source, unit)
     try:
         surface = surface_map(read.points_mm, read.triangles, link, read.simplified_from)
     except GeometryError as error:
-        raise GeometryError(f"{path}: {error}") from None
+        raise GeometryError(f"{where}: {error}") from None
     return CoveredSurface(surface, read.file_points_mm)

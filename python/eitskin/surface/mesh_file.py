@@ -1,5 +1,6 @@
 """Read a surface from a mesh file: OBJ, PLY or STL."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import numpy as np
 
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import FileError, GeometryError, missing_extra
+from eitskin.kinematics.link_mesh import LinkMesh
 from eitskin.surface.topology import check_disk, rim_loop
 
 SUFFIXES = (".obj", ".ply", ".stl")
@@ -17,6 +19,15 @@ MIN_TRIANGLES = 20
 MIN_MM, MAX_MM = 5.0, 5000.0
 MERGE = 1e-6  # vertices closer than this part of the surface's size are one
 UNITS_MM = {"mm": 1.0, "m": 1000.0}
+# What to do about a surface that is a skin's size if its numbers are multiplied by the key.
+UNIT_HINTS = {
+    "mm": {1e3: 'its numbers seem to be in m: write surface_unit = "m"'},
+    "m": {1e-3: 'its numbers seem to be in mm: write surface_unit = "mm"'},
+}
+URDF_HINTS = {
+    1e-3: 'its numbers seem to be in mm: write scale="0.001 0.001 0.001" in the URDF\'s <mesh>',
+    1e3: "its numbers seem to be in m already: leave the scale of the URDF's <mesh> out",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,19 +42,26 @@ class SurfaceMesh:
     simplified_from: int = 0
 
 
-def read_surface(path: Path, unit: str = "mm") -> SurfaceMesh:
-    """Read the mesh file ``path``, whose numbers are in ``unit``, "mm" or "m". Vertices at the same
-    place become one. A mesh of more than MAX_TRIANGLES is simplified.
+def read_surface(source: Path | LinkMesh, unit: str = "mm") -> SurfaceMesh:
+    """Read a mesh file, whose numbers are in ``unit``, "mm" or "m", or the mesh of a URDF's link,
+    into the link's frame. Vertices at the same place become one. A mesh of more than MAX_TRIANGLES
+    is simplified.
 
     Raises:
         FileError: the file cannot be read.
         GeometryError: it is not a disk, or its size is not that of a skin.
         MissingExtraError: trimesh is not installed.
     """
-    points, triangles = _loaded(path)
-    points = points * UNITS_MM[unit]
+    path = source.file if isinstance(source, LinkMesh) else source
     where = str(path)
-    _check_numbers(points, triangles, unit, where)
+    points, triangles = _loaded(path)
+    if isinstance(source, LinkMesh):
+        points, triangles = 1e3 * source.points_m(points), source.outward(triangles)
+        hints = URDF_HINTS
+    else:
+        points, hints = points * UNITS_MM[unit], UNIT_HINTS[unit]
+    _check_numbers(points, triangles, where)
+    _check_size(points, hints, where)
     merged, joined = merge_vertices(points, triangles)
     count = len(joined)
     if count > MAX_TRIANGLES:
@@ -93,7 +111,7 @@ def _loaded(path: Path) -> tuple[FloatArray, IntArray]:
     return points, triangles
 
 
-def _check_numbers(points: FloatArray, triangles: IntArray, unit: str, where: str) -> None:
+def _check_numbers(points: FloatArray, triangles: IntArray, where: str) -> None:
     if not np.isfinite(points).all():
         bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
         raise GeometryError(f"{where}: vertex {bad} (from 0) is not finite; repair the file")
@@ -102,17 +120,17 @@ def _check_numbers(points: FloatArray, triangles: IntArray, unit: str, where: st
             f"{where}: {len(triangles)} triangles is out of range; a surface has {MIN_TRIANGLES} to"
             f" {MAX_FILE_TRIANGLES}"
         )
-    size = np.ptp(points, axis=0)
-    if not MIN_MM <= size.max() <= MAX_MM:
-        other = "m" if unit == "mm" else "mm"
-        hint = (
-            f'its numbers seem to be in {other}: write surface_unit = "{other}"'
-            if MIN_MM <= size.max() / UNITS_MM[unit] * UNITS_MM[other] <= MAX_MM
-            else f"a skin is {MIN_MM:g} to {MAX_MM:g} mm long, so scale the mesh"
-        )
-        raise GeometryError(
-            f"{where}: the surface is {size[0]:.3g} x {size[1]:.3g} x {size[2]:.3g} mm; {hint}"
-        )
+
+
+def _check_size(points_mm: FloatArray, hints: Mapping[float, str], where: str) -> None:
+    size = np.ptp(points_mm, axis=0)
+    if MIN_MM <= size.max() <= MAX_MM:
+        return
+    likely = [text for factor, text in hints.items() if MIN_MM <= factor * size.max() <= MAX_MM]
+    hint = likely[0] if likely else f"a skin is {MIN_MM:g} to {MAX_MM:g} mm long, so scale the mesh"
+    raise GeometryError(
+        f"{where}: the surface is {size[0]:.3g} x {size[1]:.3g} x {size[2]:.3g} mm; {hint}"
+    )
 
 
 def _simplified(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:

@@ -21,7 +21,7 @@ ORDER = (
     {"errors", "arrays", "process", "progress"},
     {"fileio", "threads"},
     {"config"},
-    {"core", "skin", "firmware", "surface"},
+    {"core", "skin", "firmware", "surface", "kinematics"},
     {"fem"},
     {"model"},
     {"frames"},

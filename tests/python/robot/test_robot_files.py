@@ -7,10 +7,10 @@ import pytest
 
 from eitskin.cli.main import main
 from eitskin.errors import ConfigError, EitskinError, UsageError
+from eitskin.kinematics.pose import IDENTITY, from_quaternion, from_rpy, quaternion_xyzw
+from eitskin.kinematics.urdf import load_urdf
 from eitskin.robot.description import is_robot, load_robot, open_robot
 from eitskin.robot.placement import Placement
-from eitskin.robot.pose import IDENTITY, from_quaternion, from_rpy, quaternion_xyzw
-from eitskin.robot.urdf import load_urdf
 
 URDF = """<robot name="arm">
   <link name="base"/><link name="upper"/><link name="hand"/>

@@ -11,9 +11,9 @@ import pytest
 
 from eitskin.cli.main import main
 from eitskin.device.known_model import KnownModel
+from eitskin.kinematics.pose import from_rpy
 from eitskin.robot.description import load_robot
 from eitskin.robot.placement import Placement
-from eitskin.robot.pose import from_rpy
 from eitskin.session.frame import DriveReport, Frame
 from eitskin.session.robot_session import RobotSession
 from eitskin.session.session import Session

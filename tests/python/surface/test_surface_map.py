@@ -9,8 +9,8 @@ from eitm_bytes import HEADER_SIZE
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.engine import CoreEngine
 from eitskin.errors import ModelError
+from eitskin.kinematics.pose import quaternion_xyzw
 from eitskin.model.eitm import HEADER, decode_model, encode_model
-from eitskin.robot.pose import quaternion_xyzw
 from eitskin.surface.flatten import flattened
 from eitskin.surface.section import decode_surface, encode_surface
 from eitskin.surface.shapes import make_shape

@@ -1,5 +1,6 @@
 """Read what a robot file needs of a URDF: the names of links, their places while all joints are at
-zero, and the elements  <eitskin reference="LINK" device="URL">  that name skins."""
+zero, and the elements  <eitskin reference="LINK" device="URL">  that name skins. The module
+``link_mesh`` reads the meshes of links."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from xml.etree import ElementTree
 from eitskin.config import check_keys, plain_number
 from eitskin.errors import ConfigError
 from eitskin.fileio import read_bytes
-from eitskin.robot.pose import IDENTITY, Pose, from_rpy
+from eitskin.kinematics.pose import IDENTITY, Pose, from_rpy
 
 MAX_URDF_BYTES = 10_000_000
 MAX_LINKS = 10_000
@@ -33,6 +34,19 @@ def load_urdf(path: str | Path) -> Urdf:
         FileError: it cannot be read.
         ConfigError: it is no URDF, or its joints do not make a tree of its links.
     """
+    root = urdf_root(path)
+    names = list(link_elements(root, path))
+    skins = tuple(_skin(one, path) for one in root.findall("eitskin"))
+    return Urdf(root.get("name") or Path(path).stem, _links(root, names, path), skins)
+
+
+def urdf_root(path: str | Path) -> ElementTree.Element:
+    """Return the element <robot> of a URDF.
+
+    Raises:
+        FileError: it cannot be read.
+        ConfigError: it is no URDF.
+    """
     content = read_bytes(path, "URDF", MAX_URDF_BYTES)
     if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
         raise ConfigError(f"{path}: has a document type, which a URDF does not need; remove it")
@@ -44,14 +58,24 @@ def load_urdf(path: str | Path) -> Urdf:
         raise ConfigError(f"{path}: not valid XML: {error}") from None
     if root.tag != "robot":
         raise ConfigError(f"{path}: not a URDF: its outer element is <{root.tag}>, not <robot>")
-    names = [_attribute(one, "name", path) for one in root.findall("link")]
-    for name in names:
-        if names.count(name) > 1:
+    return root
+
+
+def link_elements(root: ElementTree.Element, path: str | Path) -> dict[str, ElementTree.Element]:
+    """Return the elements <link> by their names.
+
+    Raises:
+        ConfigError: a link has no name, two have the same, or there are none or too many.
+    """
+    links: dict[str, ElementTree.Element] = {}
+    for one in root.findall("link"):
+        name = attribute(one, "name", path)
+        if name in links:
             raise ConfigError(f"{path}: link {name!r} comes twice; give each its own name")
-    if not 1 <= len(names) <= MAX_LINKS:
-        raise ConfigError(f"{path}: has {len(names)} links; a URDF has 1 to {MAX_LINKS}")
-    skins = tuple(_skin(one, path) for one in root.findall("eitskin"))
-    return Urdf(root.get("name") or Path(path).stem, _links(root, names, path), skins)
+        links[name] = one
+    if not 1 <= len(links) <= MAX_LINKS:
+        raise ConfigError(f"{path}: has {len(links)} links; a URDF has 1 to {MAX_LINKS}")
+    return links
 
 
 def _links(root: ElementTree.Element, names: list[str], path: str | Path) -> dict[str, Pose]:
@@ -68,7 +92,7 @@ def _links(root: ElementTree.Element, names: list[str], path: str | Path) -> dic
         parent, child = ends
         if child in joints:
             raise ConfigError(f"{where}: link {child!r} has two parents; leave one joint out")
-        joints[child] = parent, _origin(joint, where)
+        joints[child] = parent, origin_of(joint, where)
     poses: dict[str, Pose] = {}
     for name in names:
         way = []  # from the link up to one whose pose is known
@@ -85,35 +109,53 @@ def _links(root: ElementTree.Element, names: list[str], path: str | Path) -> dic
 
 
 def _skin(element: ElementTree.Element, path: str | Path) -> dict[str, Any]:
-    link = _attribute(element, "reference", path)
+    link = attribute(element, "reference", path)
     table: dict[str, Any] = {"name": link, "link": link} | dict(element.attrib)
     del table["reference"]
     where = f"{path}: <eitskin> of link {link!r}"
     check_keys(table, ("name", "link", "device", "model"), where)
     for key, value in (("xyz_m", "xyz"), ("rpy_rad", "rpy")):
-        table[key] = _numbers(element, value, where)
+        table[key] = _origin(element, value, where)
     return table
 
 
-def _origin(element: ElementTree.Element, where: str) -> Pose:
-    return from_rpy(_numbers(element, "xyz", where), _numbers(element, "rpy", where))
+def origin_of(element: ElementTree.Element, where: str) -> Pose:
+    """Return the pose of an element's <origin>; ``where`` names the element in errors.
+
+    Raises:
+        ConfigError: it is not three numbers each for xyz and rpy.
+    """
+    return from_rpy(_origin(element, "xyz", where), _origin(element, "rpy", where))
 
 
-def _numbers(element: ElementTree.Element, name: str, where: str) -> list[float]:
-    """Three numbers of an element's origin, 0 where it has none."""
+def _origin(element: ElementTree.Element, name: str, where: str) -> list[float]:
     origin = element.find("origin")
     text = "0 0 0" if origin is None else origin.get(name, "0 0 0")
+    return three_numbers(text, f"{where}: its origin has {name}")
+
+
+def three_numbers(text: str, what: str) -> list[float]:
+    """Return the three numbers in an attribute's ``text``; ``what`` names it in errors.
+
+    Raises:
+        ConfigError: there are others than three, or one is too large.
+    """
     try:
         numbers = [plain_number(one) for one in text.split()]
     except ValueError:
         numbers = []
     if len(numbers) != 3 or not all(abs(one) < 1e6 for one in numbers):
-        raise ConfigError(f"{where}: its origin has {name}={text!r}; write three numbers")
+        raise ConfigError(f"{what}={text!r}; write three numbers")
     return numbers
 
 
-def _attribute(element: ElementTree.Element, name: str, path: str | Path) -> str:
+def attribute(element: ElementTree.Element, name: str, where: str | Path) -> str:
+    """Return an attribute that ``element`` must have.
+
+    Raises:
+        ConfigError: it has none, or an empty one.
+    """
     value = element.get(name)
     if not value:
-        raise ConfigError(f"{path}: an element <{element.tag}> has no {name}")
+        raise ConfigError(f"{where}: an element <{element.tag}> has no {name}")
     return value

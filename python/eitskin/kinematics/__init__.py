@@ -1,0 +1,1 @@
+"""Frames of reference: poses, and the links of a URDF with their meshes."""
