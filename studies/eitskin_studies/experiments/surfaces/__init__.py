@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.arrays import FloatArray
-from eitskin.core.results import Touch
+from eitskin.core.diagnostics_table import Touch
 from eitskin.errors import EitskinError, FrameError
 from eitskin.model.build import BuildSettings, build_model
 from eitskin.model.eitm import load_model, save_model
