@@ -42,7 +42,7 @@ def test_run_writes_tables_and_pictures(done, tmp_path):
     found = {path.name for path in (tmp_path / "out").iterdir() if path.is_file()}
     pictures = set(DRAWN)
     assert found == {"results.jsonl", "front.json", "table.csv"} | pictures
-    assert all((tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
+    assert all((tmp_path / "out" / name).read_bytes().startswith(b"<?xml") for name in pictures)
     assert len(load_front(tmp_path / "out" / "front.json").points) == 3
     front = tmp_path / "small.json"
     assert "MIoU" in done(f"recommend --front {front} --budget 1s --board host")

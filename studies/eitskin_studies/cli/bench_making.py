@@ -2,7 +2,6 @@
 
 import argparse
 import json
-from pathlib import Path
 from typing import Any
 
 from eitskin.cli.arguments import option
@@ -34,7 +33,7 @@ def add_effects(what: Any) -> None:
         help="scenes: time, memory, work and modules with no effect, with each alone, with all",
     )
     option(parser, "--frames", default=100)
-    option(parser, "--picture PNG", "draw it", Path)
+    option(parser, "--rounds", "interleaved; the median counts", default=5)
     add_page_option(parser, "scene-cost")
     parser.set_defaults(run=run_effects)
 
@@ -43,19 +42,21 @@ def run_effects(options: argparse.Namespace) -> int:
     """Time each effect on one scene."""
     from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import scenes as bench_scenes
+    from eitskin_studies.harness.drawings import Drawing, draw_again, keep_drawings
     from eitskin_studies.harness.sections import fill_marks
+    from eitskin_studies.pictures.scene_cost_picture import draw_scene_cost
 
     check_within("--frames", options.frames, 2, 100_000)
-    refuse_unwritable(options.page, options.picture)
-    result = bench_scenes.effects_table(options.frames, progress=progress_bar)
-    if options.picture is not None:
-        from eitskin_studies.pictures.scene_cost_picture import draw_scene_cost
-
-        draw_scene_cost(options.picture, result)
+    check_within("--rounds", options.rounds, 1, 1000)
+    refuse_unwritable(options.page)
+    result = bench_scenes.effects_table(options.frames, options.rounds, progress_bar)
     if options.page is not None:
-        command = f"eitskin bench effects --frames {options.frames}"
-        command += " --page studies/results/scene-cost.md --picture PNG"
+        command = f"eitskin bench effects --frames {options.frames} --rounds {options.rounds}"
+        command += " --page studies/results/scene-cost.md"
         fill_marks(options.page, "scene-cost", bench_scenes.effects_filling(result, command))
+        drawing = Drawing(draw_scene_cost, result["cases"])
+        keep_drawings(options.page, {"pictures/scene-cost.svg": drawing})
+        draw_again(options.page)
     print(json.dumps(result, indent=2) if options.json else bench_scenes.effects_text(result))
     return 0
 

@@ -32,6 +32,11 @@ def add_parser(subparsers: Any) -> None:
     option(live, "-o --output WEBP", None, Path, required=True)
     option(live, "--robot", "instead the arm of examples/robot in three dimensions, one picture")
     live.set_defaults(run=run_live)
+    page = what.add_parser(
+        "page", help="the pictures of a page of results again, from their stored numbers"
+    )
+    option(page, "name NAME", "of the page: studies/results/NAME.md")
+    page.set_defaults(run=run_page)
     examples = what.add_parser("examples", help="hand.svg and forearm.dxf")
     option(examples, "-o --output FOLDER", None, Path, required=True)
     examples.set_defaults(run=run_examples)
@@ -88,6 +93,23 @@ def run_live(options: argparse.Namespace) -> int:
     refuse_unwritable(options.output)
     (draw_live_robot if options.robot else draw_live_view)(options.output)
     print(f"picture: {options.output}")
+    return 0
+
+
+def run_page(options: argparse.Namespace) -> int:
+    """Draw a page's pictures again."""
+    from eitskin_emulator.core_on_qemu import checkout_root
+    from eitskin_studies.harness.drawings import draw_again
+    from eitskin_studies.pictures.tradeoff_pictures import draw_all
+    from eitskin_studies.tradeoff.fronts import recorded_front
+    from eitskin_studies.tradeoff.page import PICTURES
+
+    page = checkout_root() / "studies" / "results" / f"{options.name}.md"
+    if options.name == "tradeoff":  # its points are recorded in a file of their own
+        drawn = draw_all(page.parent / PICTURES, recorded_front())
+    else:
+        drawn = draw_again(page)
+    print("\n".join(f"picture: {path}" for path in drawn))
     return 0
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from eitskin.fileio import write_beside, write_bytes
 from eitskin_studies.experiments.experiment import ExperimentOutcome, ExperimentSettings, Table
+from eitskin_studies.harness.drawings import Drawing, keep_drawings
 from eitskin_studies.harness.sections import Tabular, fill_marks, text_table
 
 
@@ -35,7 +36,7 @@ def write_page(
     outcome: ExperimentOutcome, folder: Path, page: Path, name: str, settings: ExperimentSettings
 ) -> None:
     """Fill the marks of ``page``: each table, the outcome's words, and ``command``; pictures go to
-    ``pictures/NAME/`` beside it.
+    ``pictures/NAME/`` beside it, and the numbers of those that are a ``Drawing`` are stored.
 
     Raises:
         FileError: the page cannot be read or written.
@@ -46,6 +47,14 @@ def write_page(
     fill_marks(page, name, (texts, tables))
     target = page.parent / "pictures" / name
     target.mkdir(parents=True, exist_ok=True)
+    keep_drawings(
+        page,
+        {
+            f"pictures/{name}/{picture}": draw
+            for picture, draw in outcome.pictures.items()
+            if isinstance(draw, Drawing)
+        },
+    )
     for picture in outcome.pictures:
         if (folder / picture).is_file():
             with write_beside(target / picture) as temporary:

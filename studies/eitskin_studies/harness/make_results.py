@@ -29,7 +29,7 @@ OTHERS = {
     "gestures": "bench gestures --sessions 60 --seed 7001 --role judging --snr-db 60 40"
     " --page {page}",
     "peers": "bench peers --scenes 20 --seed 1 --page {page}",
-    "scene-cost": "bench effects --frames 40 --page {page} --picture {pictures}/scene-cost.png",
+    "scene-cost": "bench effects --frames 40 --page {page}",
     "latency": "bench latency --presses 200 --emulated 24 --seed 1 --order 'by 7' --page {page}"
     " --picture {pictures}/latency.png",
     "board-cost": "bench board --scenes 180 --seed 1 --frames 12 --page {page}",

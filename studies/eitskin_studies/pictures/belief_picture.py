@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from eitskin.view.panels import save_picture
-from eitskin.view.pictures import FOUND, INK, STYLE, load_matplotlib
+from eitskin.view.pictures import INK
 from eitskin_studies.experiments.belief.tables import HIGH, LOW, Sets, coverage, curve
+from eitskin_studies.pictures.style import BLUE, SKY, drawing, plain_axes
 from eitskin_studies.worlds.worlds import in_words
 
 SMALLEST = 1e-3
@@ -18,19 +18,15 @@ def draw_belief(path: Path, sets: Sets) -> None:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
     covered = [(name, one) for name, frames in sets.items() if (one := coverage(frames)).count]
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(
-            figsize=(9.6, 0.6 + 0.2 * max(len(covered), 12)), layout="constrained"
-        )
+    with drawing(path, 9.6, 0.9 + 0.2 * max(len(covered), 12)) as figure:
         left, right = figure.subplots(1, 2, width_ratios=(1, 1.1))
         left.plot([SMALLEST, 1], [SMALLEST, 1], color=INK, linewidth=0.7, linestyle=":")
         for part in curve(sets):
             said, true = 1 - part.said, part.true
             ends = [max(1 - value, SMALLEST) for value in (true.high, true.low)]
-            left.plot([said, said], ends, color=FOUND, linewidth=1.2)
-            left.plot(said, max(1 - true.mean, SMALLEST), "o", color=FOUND, markersize=4)
+            left.plot([said, said], ends, color=BLUE, linewidth=1.2)
+            left.plot(said, max(1 - true.mean, SMALLEST), "o", color=BLUE, markersize=4)
         left.set(
             xscale="log",
             yscale="log",
@@ -40,10 +36,10 @@ def draw_belief(path: Path, sets: Sets) -> None:
             xlim=(SMALLEST, 1),
             ylim=(SMALLEST, 1),
         )
-        right.axvspan(100 * LOW, 100 * HIGH, color=FOUND, alpha=0.15, linewidth=0)
+        right.axvspan(100 * LOW, 100 * HIGH, color=SKY, alpha=0.25, linewidth=0)
         for place, (_, one) in enumerate(covered):
-            right.plot([100 * one.low, 100 * one.high], [place, place], color=FOUND, linewidth=1.2)
-            right.plot(100 * one.mean, place, "o", color=FOUND, markersize=4)
+            right.plot([100 * one.low, 100 * one.high], [place, place], color=BLUE, linewidth=1.2)
+            right.plot(100 * one.mean, place, "o", color=BLUE, markersize=4)
         right.set_yticks(range(len(covered)), [in_words(name) for name, _ in covered])
         right.invert_yaxis()
         right.set(
@@ -51,4 +47,5 @@ def draw_belief(path: Path, sets: Sets) -> None:
             xlim=(0, 100),
             title="Is the place's 90 % ellipse true? (band: 87 to 93 %)",
         )
-        save_picture(figure, path)
+        for axes in (left, right):
+            plain_axes(axes)

@@ -5,12 +5,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from eitskin.tuning.front import F767_MHZ, REPORT_US, Conditions, Front, OperatingPoint
 from eitskin.tuning.report_time import report_us
-from eitskin.view.panels import save_picture
-from eitskin.view.pictures import INK, STYLE, load_matplotlib
+from eitskin.view.pictures import INK, load_matplotlib
+from eitskin_studies.pictures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    drawing,
+    legend_below,
+    plain_axes,
+    plain_ticks,
+)
 from eitskin_studies.tradeoff.equal import Reached, reached
 from eitskin_studies.tradeoff.fronts import chosen_presets, pareto
 from eitskin_studies.tradeoff.peers import SCANS
@@ -19,11 +31,10 @@ from eitskin_studies.tradeoff.table import MIN_GAIN
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# safe for colour-blind readers (Okabe and Ito)
-COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#333333", "#d55e00", "#e69f00", "#cc79a7", "#999999")
+OURS = (BLUE, SKY, GREEN, BLACK)
 MARKERS = dict(zip(SCANS, "osD^", strict=True))
-OTHER = "#8a8a8a"
-NAMED = {"plain FISTA 3000, non-negative": "#d55e00", "plain FISTA 300, non-negative": "#e69f00"}
+OTHER = GREY
+NAMED = {"plain FISTA 3000, non-negative": VERMILION, "plain FISTA 300, non-negative": ORANGE}
 BOARD_LABELS = (
     "mean frame at an instruction per cycle",
     "mean frame, from the optimistic to the pessimistic bound",
@@ -46,32 +57,27 @@ def draw_equal_by_noise(path: Path, front: Front) -> None:
 
 
 def _draw_panels(path: Path, front: Front, snrs_db: Sequence[float]) -> None:
-    matplotlib = load_matplotlib()
     every = reached(front)
-    with matplotlib.rc_context(STYLE):
-        width = 9.0 if len(snrs_db) == 1 else 14.0
-        figure = matplotlib.figure.Figure(figsize=(width, 5.6), layout="constrained")
+    named = len(snrs_db) == 1
+    with drawing(path, 9.0 if named else 13.0, 5.6) as figure:
         panels = figure.subplots(1, len(snrs_db), sharey=True, squeeze=False)[0]
         for axes, snr_db in zip(panels, snrs_db, strict=True):
-            _draw_methods(
-                axes, [one for one in every if one.snr_db == snr_db], named=len(panels) == 1
-            )
+            _draw_methods(axes, [one for one in every if one.snr_db == snr_db], named)
             axes.set_title(f"SNR {snr_db:g} dB")
             axes.set_xlabel("ms from contact to report (half a period, scan, solve, link)")
         panels[0].set_ylabel("mean MIoU of the image")
-        _legend(panels[-1], every, named=len(panels) == 1)
+        legend_below(figure, _entries(every, named), 4 if named else 6)
         how = front.settings
         figure.suptitle(
             f"All methods on equal scans: {how.get('scenes')} scenes of 1 to 3 touches, seed"
             f" {how.get('seed')}, solver on a host"
         )
-        save_picture(figure, path)
 
 
 def _style(name: str, ours: Sequence[str]) -> tuple[str, float]:
     """Colour and line width of a method."""
     if name in ours:
-        return COLOURS[ours.index(name) % 4], 1.8
+        return OURS[ours.index(name) % len(OURS)], 1.8
     return NAMED.get(name, OTHER), 1.0
 
 
@@ -87,13 +93,11 @@ def _draw_methods(axes: Axes, every: Sequence[Reached], named: bool) -> None:
             axes.plot(one.report_ms, one.mean, MARKERS[one.scan], ms=4.5, color=colour)
         ends.append((ys[-1], xs[-1], name, colour))
     axes.set_xscale("log")
-    axes.set_xticks(TICKS_MS, [str(ms) for ms in TICKS_MS])
-    axes.minorticks_off()
-    axes.grid(linewidth=0.4, alpha=0.5)
-    axes.spines[["top", "right"]].set_visible(False)
+    plain_ticks(axes.xaxis, TICKS_MS)
+    plain_axes(axes)
     if named:
         low, high = axes.get_ylim()
-        axes.set_xlim(12, 3000)
+        axes.set_xlim(14, 1500)
         _name_ends(axes, ends, 0.034 * (high - low))
 
 
@@ -114,26 +118,23 @@ def _name_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]], least:
         )
 
 
-def _legend(axes: Axes, every: Sequence[Reached], named: bool) -> None:
-    """Draw a legend of the markers, and of the colours if lines have no names."""
+def _entries(every: Sequence[Reached], named: bool) -> list[tuple[Any, str]]:
+    """Return the legend's markers, after the colours if lines have no names."""
     line = load_matplotlib().lines.Line2D
     ours = list(dict.fromkeys(one.name for one in every if one.ours))
-    entries = {} if named else {name: _style(name, ours)[0] for name in (*ours, *NAMED)}
-    handles = [line([], [], color=colour) for colour in entries.values()]
-    labels = list(entries)
+    coloured = {} if named else {name: _style(name, ours)[0] for name in (*ours, *NAMED)}
     if not named:
-        handles.append(line([], [], color=OTHER))
-        labels.append("other methods")
+        coloured["other methods"] = OTHER
+    entries = [(line([], [], color=colour), name) for name, colour in coloured.items()]
     for scan in SCANS:
-        handles.append(line([], [], color=INK, marker=MARKERS[scan], linestyle="none", ms=4.5))
-        labels.append(scan.name)
-    axes.legend(handles, labels, frameon=False, loc="lower right", fontsize=7)
+        marker = line([], [], color=INK, marker=MARKERS[scan], linestyle="none", ms=4.5)
+        entries.append((marker, scan.name))
+    return entries
 
 
 def draw_board(path: Path, front: Front) -> None:
     """The board: image MIoU over the time to the report with the range of its times, presets
     named."""
-    matplotlib = load_matplotlib()
     usable = [one for one in front.points if one.fits_f767 and not one.configuration.warm_start]
     line = pareto(
         usable,
@@ -143,25 +144,23 @@ def draw_board(path: Path, front: Front) -> None:
     )
     presets = chosen_presets(usable, "f767")
     shown = {one.name: one for one in (*line, *presets.values()) if one.instructions is not None}
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(9.0, 5.0), layout="constrained")
+    with drawing(path, 9.0, 5.2) as figure:
         axes = figure.subplots()
         for number, one in enumerate(shown.values()):
             ms, low_ms, high_ms, most_ms = _board_ms(one)
             y = one.accuracy(Conditions()) or 0.0
             labels = BOARD_LABELS if not number else ("", "", "")
-            axes.plot(ms, y, "o", mfc="none", color=COLOURS[0], ms=5, label=labels[0])
-            axes.plot([low_ms, high_ms], [y, y], color=COLOURS[0], lw=4, alpha=0.4, label=labels[1])
-            axes.plot([high_ms, most_ms], [y, y], color=COLOURS[4], lw=1, label=labels[2])
+            axes.plot(ms, y, "o", mfc="none", color=BLUE, ms=5, label=labels[0])
+            axes.plot([low_ms, high_ms], [y, y], color=BLUE, lw=4, alpha=0.4, label=labels[1])
+            axes.plot([high_ms, most_ms], [y, y], color=VERMILION, lw=1, label=labels[2])
         _name_presets(axes, presets)
         axes.set_xlabel("ms from contact to report on the board (half a period, scan, solve, link)")
         axes.set_ylabel("mean MIoU of the solver's image")
         axes.set_xlim(left=0)
-        axes.grid(linewidth=0.4, alpha=0.5)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(frameon=False, loc="lower right")
+        axes.margins(y=0.1)
+        plain_axes(axes)
+        legend_below(figure, axes, 2)
         axes.set_title("The board at 60 dB: Pareto-optimal settings and presets, bounds of time")
-        save_picture(figure, path)
 
 
 def _board_ms(point: OperatingPoint) -> tuple[float, float, float, float]:

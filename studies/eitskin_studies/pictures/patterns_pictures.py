@@ -4,43 +4,34 @@ from."""
 from collections.abc import Mapping
 from pathlib import Path
 
-from eitskin.view.panels import save_picture
-from eitskin.view.pictures import STYLE, load_matplotlib
-
-SHADES = ("#212121", "#0d47a1", "#1e88e5", "#64b5f6", "#b3d7f5", "#8d6e63", "#ef6c00")
+from eitskin_studies.pictures.style import COLOURS, MARKERS, drawing, legend_below, plain_axes
 
 
-def draw_patterns(
-    path: str | Path,
-    bounds: Mapping[str, Mapping[str, float]],
-    product: Mapping[str, Mapping[str, float]],
-) -> None:
-    """Medians in mm by noise and pattern, the bound above and the product's touches below; a PNG.
+def draw_patterns(path: str | Path, data: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:
+    """Medians in mm by noise and pattern, ``bound`` above and ``product``, the product's touches,
+    below.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
-    noises = list(bounds)
-    patterns = list(bounds[noises[0]])
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(9.6, 5.6), layout="constrained")
-        axes = figure.subplots(2, 1, sharex=True)
-        width = 0.8 / len(patterns)
-        titles = ("Cramer-Rao bound", "the product's touches")
-        for one, values, title in zip(axes, (bounds, product), titles, strict=True):
+    noises = list(data["bound"])
+    patterns = list(data["bound"][noises[0]])
+    titles = {"bound": "Cramer-Rao bound", "product": "the product's touches"}
+    with drawing(path, 9.6, 5.6) as figure:
+        panels = figure.subplots(2, 1, sharex=True)
+        for axes, (name, title) in zip(panels, titles.items(), strict=True):
             for k, pattern in enumerate(patterns):
-                places = [n + (k - (len(patterns) - 1) / 2) * width for n in range(len(noises))]
-                heights = [values[noise][pattern] for noise in noises]
-                one.bar(places, heights, 0.92 * width, color=SHADES[k], label=pattern)
-            one.set_title(title)
-            one.set_ylabel("place, median (mm)")
-            one.spines[["top", "right"]].set_visible(False)
+                shift = 0.8 * ((k + 0.5) / len(patterns) - 0.5)
+                places = [n + shift for n in range(len(noises))]
+                heights = [data[name][noise][pattern] for noise in noises]
+                colour = COLOURS[k % len(COLOURS)]
+                axes.vlines(places, 0, heights, color=colour, linewidth=1.2)
+                axes.plot(places, heights, MARKERS[k], color=colour, markersize=5.5, label=pattern)
+            axes.set_title(title)
+            axes.set_ylabel("place, median (mm)")
+            axes.set_ylim(bottom=0)
+            plain_axes(axes, "y")
         labels = [noise.replace(", ", ",\n").replace("end as", "end\nas") for noise in noises]
-        axes[1].set_xticks(range(len(noises)), labels)
-        handles, names = axes[0].get_legend_handles_labels()
-        figure.legend(
-            handles, names, loc="outside lower center", ncols=len(patterns), frameon=False
-        )
-        save_picture(figure, path)
+        panels[1].set_xticks(range(len(noises)), labels)
+        legend_below(figure, panels[0], len(patterns))

@@ -1,43 +1,60 @@
-"""Bars of the cost of each effect of a scene, beside the scene without effects."""
+"""The cost of each effect of a scene, beside the scene without effects."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from eitskin.view.panels import save_picture
-from eitskin.view.pictures import INK, STYLE, load_matplotlib
+from eitskin.view.pictures import INK
+from eitskin_studies.pictures.style import (
+    BLUE,
+    GREEN,
+    PURPLE,
+    VERMILION,
+    drawing,
+    plain_axes,
+    plain_ticks,
+)
 
-TIME, MEMORY = "#1f6fb4", "#d1661f"
 
-
-def draw_scene_cost(path: str | Path, result: dict[str, Any]) -> None:
-    """Time and memory of each effect alone, and the numbers of factorisations, dearest first.
+def draw_scene_cost(path: str | Path, cases: Mapping[str, Mapping[str, Any]]) -> None:
+    """Time and memory of each effect alone, over those of the scene without effects, and the
+    numbers of factorisations and of modules that it imports; the most expensive above. ``cases``
+    has for each effect ``ratio``, ``peak_mb``, ``factorisations`` and ``modules``.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
-    cases = sorted(result["cases"].items(), key=lambda one: one[1]["ratio"])
-    at = range(len(cases))
-    none_mb = result["cases"]["none"]["peak_mb"]
-    with matplotlib.rc_context(STYLE):
-        size = (8.0, 0.2 * len(cases) + 1.0)
-        figure = matplotlib.figure.Figure(figsize=size, layout="constrained")
-        left, right = figure.subplots(1, 2, sharey=True)
-        for axes, color, title, values in (
-            (left, TIME, "time", [row["ratio"] for _, row in cases]),
-            (right, MEMORY, "memory", [row["peak_mb"] / none_mb for _, row in cases]),
-        ):
-            axes.barh(at, values, color=color, height=0.7)
-            axes.axvline(1.0, color=INK, linewidth=0.8, linestyle=":")
+    rows = sorted(cases.items(), key=lambda one: one[1]["ratio"])
+    none = cases["none"]
+    kinds = (
+        ("time,\nwithout effects = 1", BLUE, [row["ratio"] for _, row in rows], 1.0),
+        (
+            "memory,\nwithout effects = 1",
+            VERMILION,
+            [row["peak_mb"] / none["peak_mb"] for _, row in rows],
+            1.0,
+        ),
+        (
+            "factorisations",
+            GREEN,
+            [row["factorisations"] for _, row in rows],
+            none["factorisations"],
+        ),
+        ("modules imported\nbeyond those of none", PURPLE, [row["modules"] for _, row in rows], 0),
+    )
+    with drawing(path, 9.6, 0.2 * len(rows) + 1.5) as figure:
+        panels = figure.subplots(1, len(kinds), sharey=True)
+        for axes, (title, colour, values, without) in zip(panels, kinds, strict=True):
+            axes.axvline(without, color=INK, linewidth=0.8, linestyle=":")
+            axes.hlines(range(len(rows)), without, values, color=colour, linewidth=1.2)
+            axes.plot(values, range(len(rows)), "o", color=colour, markersize=4.5)
+            axes.set_title(title, fontsize=9)
+            plain_axes(axes, "x")
+            axes.margins(y=0.02)
+        for axes in panels[:2]:
             axes.set_xscale("log")
-            axes.set_title(f"{title}, of the scene without effects", fontsize=9)
-            axes.spines[["top", "right"]].set_visible(False)
-            axes.tick_params(labelsize=8)
-            axes.margins(y=0.01)
-        for k, (_, row) in enumerate(cases):
-            text = f" {row['factorisations']}"
-            left.text(row["ratio"], k, text, va="center", fontsize=6, color=INK)
-        left.set_yticks(at, [name.replace("_", " ") for name, _ in cases], fontsize=8)
-        left.set_xlabel("numbers: factorisations", fontsize=8)
-        save_picture(figure, path)
+            plain_ticks(axes.xaxis, (0.5, 1, 2, 5, 10, 20))
+        names = ["no effect" if name == "none" else name.replace("_", " ") for name, _ in rows]
+        panels[0].set_yticks(range(len(rows)), names, fontsize=8)
+        figure.suptitle("What each effect of a scene costs; dotted: the same scene without effects")

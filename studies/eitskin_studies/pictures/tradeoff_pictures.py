@@ -1,5 +1,5 @@
 """Pictures of the cost of accuracy: the front with its names, one knob at a time, samples against
-noise, scenes, and the objective beside the picture."""
+noise, and scenes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eitskin.tuning.front import F767_MHZ, Conditions, Front, OperatingPoint
-from eitskin.view.panels import save_picture
-from eitskin.view.pictures import INK, STYLE, load_matplotlib
+from eitskin.view.pictures import INK
 from eitskin_studies.pictures.equal_pictures import draw_board, draw_equal, draw_equal_by_noise
+from eitskin_studies.pictures.style import (
+    BLUE,
+    GREY,
+    PURPLE,
+    SNR_COLOURS,
+    VERMILION,
+    drawing,
+    legend_below,
+    plain_axes,
+    plain_ticks,
+)
 from eitskin_studies.tradeoff.table import best_points, x_of
 
 if TYPE_CHECKING:
@@ -28,12 +38,12 @@ KNOBS = {
 }
 WORDS = ("storage", "touch_sweeps", "solver")
 NOISY_KNOBS = ("rank", "regularisation", "lambda_rel")
-GREY, IMAGE, DISCS = "#9a9a9a", "#1f5fa8", "#b35c00"
+IMAGE, DISCS = BLUE, VERMILION
 LOGARITHMIC = ("iterations", "lambda_rel", "regularisation")
 
 
-def draw_all(folder: Path, front: Front) -> None:
-    """The pictures of ``DRAWN`` that the results have something for.
+def draw_all(folder: Path, front: Front) -> list[Path]:
+    """The pictures of ``DRAWN`` into ``folder``; returns their files.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -41,23 +51,23 @@ def draw_all(folder: Path, front: Front) -> None:
     """
     for name, draw in DRAWN.items():
         draw(folder / name, front)
+    return [folder / name for name in DRAWN]
 
 
 def draw_front(path: Path, front: Front) -> None:
     """MIoU over the cost, images and discs, every configuration a dot, those that nothing beats
     joined and named."""
-    matplotlib = load_matplotlib()
     counted = any(one.instructions is not None for one in front.points)
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(11.0, 5.2), layout="constrained")
-        for axes, judged in zip(figure.subplots(1, 2), ("image", "discs"), strict=True):
+    with drawing(path, 11.0, 5.4) as figure:
+        both = figure.subplots(1, 2)
+        for axes, judged in zip(both, ("image", "discs"), strict=True):
             _draw_one_front(axes, front.points, Conditions(judged=judged), counted)
+        legend_below(figure, both[0], 3)
         how = front.settings
         figure.suptitle(
             f"What accuracy costs: {how.get('scenes')} scenes of 1 to 3 random touches, 60 dB, seed"
-            f" {how.get('seed')}; line: the front"
+            f" {how.get('seed')}"
         )
-        save_picture(figure, path)
 
 
 def _draw_one_front(
@@ -65,48 +75,37 @@ def _draw_one_front(
 ) -> None:
     best = best_points(points, where)
     named = {one.name for one in best}
-    for point in points:
-        x, y = x_of(point, where), point.accuracy(where)
-        if (
-            x is not None
-            and y is not None
-            and point.name not in named
-            and not point.configuration.warm_start
-        ):
-            axes.plot(x / 1e6, y, "o", color=GREY, markersize=3.5, alpha=0.8)
-    xs = [(x_of(one, where) or 1.0) / 1e6 for one in best]
-    ys = [one.accuracy(where) or 0.0 for one in best]
-    axes.step(
-        xs, ys, where="post", color=IMAGE if where.judged == "image" else DISCS, linewidth=1.2
-    )
-    axes.plot(xs, ys, "o", color=IMAGE if where.judged == "image" else DISCS, markersize=5)
+    placed = {
+        one.name: (x / 1e6, y)
+        for one in points
+        if (x := x_of(one, where)) is not None and (y := one.accuracy(where)) is not None
+    }
+    warm = [placed[one.name] for one in points if one.configuration.warm_start]
+    others = [at for name, at in placed.items() if name not in named and at not in warm]
+    colour = IMAGE if where.judged == "image" else DISCS
+    xs, ys = ([placed[one.name][k] for one in best] for k in (0, 1))
+    if others:
+        axes.plot(*zip(*others, strict=True), "o", color=GREY, markersize=3.5, alpha=0.7,
+                  label="other settings")  # fmt: skip
+    axes.step(xs, ys, where="post", color=colour, linewidth=1.2)
+    axes.plot(xs, ys, "o", color=colour, markersize=5, label="Pareto-optimal settings")
+    if warm:
+        axes.plot(*zip(*warm, strict=True), "^", color=PURPLE, markersize=5, fillstyle="none",
+                  linestyle="none", label="warm, touches held for four frames")  # fmt: skip
     axes.set_xscale("log")
-    low = min(ys, default=0.5)
-    shown = [y for one in points if (y := one.accuracy(where)) is not None]
-    top = max(shown, default=1.0)
-    axes.set_ylim(max(low - 0.02, 0.0), top + 0.03 * (top - low) + 0.005)
+    low, high = min(ys, default=0.5), max((y for _, y in placed.values()), default=1.0)
+    axes.set_ylim(max(low - 0.02, 0.0), high + 0.14 * (high - low) + 0.005)
+    axes.set_xlim(0.1, max((x for x, _ in placed.values()), default=10) * 1.2)
     _name(axes, best, xs, ys)
-    unit = "instructions a frame on a Cortex-M7" if counted else "MACs a frame"
+    unit = "instructions per frame on a Cortex-M7" if counted else "MACs per frame"
     axes.set_xlabel(f"million {unit}, solve and touches, mean")
     axes.set_ylabel(f"mean MIoU, {'image' if where.judged == 'image' else 'touches as discs'}")
-    axes.grid(which="both", linewidth=0.4, alpha=0.4)
+    plain_axes(axes)
     if counted:
         ms = axes.secondary_xaxis("top", functions=(_to_ms, _to_instructions))
-        ms.set_xlabel("ms at 216 MHz and an instruction a cycle (an estimate)")
-        ms.set_xticks([1, 2, 5, 10, 20, 50, 100], ["1", "2", "5", "10", "20", "50", "100"])
-        ms.minorticks_off()
-    axes.set_xticks([0.2, 0.5, 1, 2, 5, 10, 20], ["0.2", "0.5", "1", "2", "5", "10", "20"])
-    axes.minorticks_off()
-    warm = [
-        (x, y)
-        for one in points
-        if one.configuration.warm_start and (x := x_of(one, where)) and (y := one.accuracy(where))
-    ]
-    if warm:
-        axes.plot([x / 1e6 for x, _ in warm], [y for _, y in warm], "^", color="#7a3b8f",
-            markersize=5, fillstyle="none",
-                  linestyle="none", label="warm, touches held for four frames")  # fmt: skip
-        axes.legend(frameon=False, fontsize=8, loc="lower right")
+        ms.set_xlabel("ms at 216 MHz and one instruction per cycle (an estimate)")
+        plain_ticks(ms.xaxis, (1, 2, 5, 10, 20, 50))
+    plain_ticks(axes.xaxis, (0.1, 0.2, 0.5, 1, 2, 5, 10))
 
 
 def _to_ms(millions: Any) -> Any:
@@ -120,37 +119,17 @@ def _to_instructions(ms: Any) -> Any:
 def _name(
     axes: Axes, best: Sequence[OperatingPoint], xs: Sequence[float], ys: Sequence[float]
 ) -> None:
-    """Names beside the dots, below right where the curve is steep; where they crowd, spread
-    downwards and joined by a line."""
+    """Names to the upper left of the dots, where no setting can be; spread upwards where they would
+    collide, and joined to their dots."""
     low, high = axes.get_ylim()
-    least, previous = 0.034 * (high - low), float("inf")
-    for one, x, y in sorted(zip(best, xs, ys, strict=True), key=lambda row: -row[2]):
-        at = min(y - 0.3 * least, previous - least)
-        previous = at
+    least, previous = 0.036 * (high - low), float("-inf")
+    for one, x, y in sorted(zip(best, xs, ys, strict=True), key=lambda row: row[2]):
+        previous = at = max(y + 0.3 * least, previous + least)
+        arrow = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
         axes.annotate(
-            one.name,
-            (x, y),
-            xytext=(x * 1.35, at),
-            fontsize=7,
-            color=INK,
-            va="center",
-            arrowprops={
-                "arrowstyle": "-",
-                "color": GREY,
-                "linewidth": 0.5,
-                "shrinkA": 0,
-                "shrinkB": 2,
-            },
-        )
-    if xs:
-        left, right = axes.get_xlim()
-        axes.set_xlim(min(left, min(xs) / 1.3), max(right, max(xs) * 4))
-
-
-def _plain_ticks(axis: Any) -> None:
-    ticker = load_matplotlib().ticker
-    axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(ticker.NullFormatter())
+            one.name, (x, y), xytext=(x / 1.14, at), fontsize=7, color=INK, ha="right",
+            va="center", arrowprops=arrow,
+        )  # fmt: skip
 
 
 def families(
@@ -181,56 +160,53 @@ def _order(value: Any) -> Any:
 def draw_knobs(path: Path, front: Front) -> None:
     """Accuracy against each knob, all else held: images and discs with the 95 % interval of their
     means."""
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(14.0, 6.4), layout="constrained")
-        for axes, (knob, label) in zip(figure.subplots(2, 4).ravel(), KNOBS.items(), strict=True):
+    with drawing(path, 12.0, 6.4) as figure:
+        panels = figure.subplots(2, 4, sharey=True)
+        for axes, (knob, label) in zip(panels.ravel(), KNOBS.items(), strict=True):
             _draw_knob(axes, families(front.points, knob)[:2], knob)
             axes.set_xlabel(label)
+            plain_axes(axes)
+        for axes in panels[:, 0]:
             axes.set_ylabel("mean MIoU")
-            axes.grid(linewidth=0.4, alpha=0.5)
+        legend_below(figure, panels[0, 0], 4)
         scenes = f"{front.settings.get('scenes')} scenes of 1 to 3 random touches, 60 dB"
         figure.suptitle(f"One knob at a time: {scenes}; bars: 95 % interval")
-        save_picture(figure, path)
 
 
 def _draw_knob(axes: Axes, groups: Sequence[Sequence[OperatingPoint]], knob: str) -> None:
-    for number, group in enumerate(groups):
-        values = [getattr(one.configuration, knob) for one in group]
+    for group, style in zip(groups, ("o-", "s--"), strict=False):
+        scored = [(one, score) for one in group if (score := one.score(Conditions())) is not None]
+        values = [getattr(one.configuration, knob) for one, _ in scored]
         places = list(range(len(values))) if knob in WORDS else values
-        base = _base_name(group)
         for judged, colour in (("image", IMAGE), ("discs", DISCS)):
-            scores = [one.score(Conditions()) for one in group]
-            means = [score[judged]["mean"] for score in scores if score is not None]
+            cells = [score[judged] for _, score in scored]
             spread = [
-                [
-                    score[judged]["mean"] - score[judged]["low"]
-                    for score in scores
-                    if score is not None
-                ],
-                [
-                    score[judged]["high"] - score[judged]["mean"]
-                    for score in scores
-                    if score is not None
-                ],
+                [cell["mean"] - cell["low"] for cell in cells],
+                [cell["high"] - cell["mean"] for cell in cells],
             ]
-            style = ("o-", "s--")[number]
-            axes.errorbar(places, means, yerr=spread, fmt=style, color=colour, markersize=4,
-                linewidth=1.1, elinewidth=0.6,
-                          capsize=1.5, label=f"{judged}, {base}")  # fmt: skip
+            axes.errorbar(
+                places, [cell["mean"] for cell in cells], yerr=spread, fmt=style, color=colour,
+                markersize=4, linewidth=1.1, elinewidth=0.6, capsize=1.5,
+                label=f"{'image' if judged == 'image' else 'touches as discs'},"
+                f" around {_base_name(group)!r}",
+            )  # fmt: skip
         if knob in WORDS:
             axes.set_xticks(places, [str(value) for value in values])
             axes.margins(x=0.15)
     if not groups:
         axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", color=GREY)
         return
+    _knob_ticks(axes, groups[0], knob)
+
+
+def _knob_ticks(axes: Axes, group: Sequence[OperatingPoint], knob: str) -> None:
+    """Ticks at the values that were measured, on a logarithmic axis where they are multiples."""
+    if knob in WORDS:
+        return
     if knob in LOGARITHMIC:
         axes.set_xscale("log")
-        _plain_ticks(axes.xaxis)
-    if knob in ("storage", "solver"):  # level lines leave no room
-        low, high = axes.get_ylim()
-        axes.set_ylim(low - 0.4 * (high - low), high)
-    axes.legend(frameon=False, fontsize=7)
+    values = sorted({getattr(one.configuration, knob) for one in group})
+    plain_ticks(axes.xaxis, [value for value in values if value not in (0.005, 90)])
 
 
 def _base_name(group: Sequence[OperatingPoint]) -> str:
@@ -244,92 +220,81 @@ def _base_name(group: Sequence[OperatingPoint]) -> str:
 def draw_noise(path: Path, front: Front) -> None:
     """The knobs that noise turns: images and discs at each SNR against rank, regularisation and
     lambda."""
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(12.0, 4.4), layout="constrained")
+    with drawing(path, 12.0, 4.6) as figure:
         columns = figure.subplots(1, len(NOISY_KNOBS), sharey=True)
         for axes, knob in zip(columns, NOISY_KNOBS, strict=True):
             group = next(iter(families(front.points, knob)), [])
-            snrs = sorted({float(snr) for one in group for snr in one.scores.get("random", {})})
-            for number, snr_db in enumerate(snrs):
-                for judged, style in (("image", "o-"), ("discs", "s--")):
-                    ys = [one.accuracy(Conditions(snr_db=snr_db, judged=judged)) for one in group]
-                    axes.plot([getattr(one.configuration, knob) for one in group], ys, style,
-                        color=f"C{number}", markersize=4,
-                              linewidth=1.1, label=f"{judged}, {snr_db:g} dB")  # fmt: skip
-            if knob in LOGARITHMIC:
-                axes.set_xscale("log")
-                _plain_ticks(axes.xaxis)
-            if group:
-                axes.set_title(f"around {_base_name(group)!r}", fontsize=9)
+            _draw_by_snr(axes, group, [getattr(one.configuration, knob) for one in group])
+            _knob_ticks(axes, group, knob)
             axes.set_xlabel(KNOBS[knob])
-            axes.grid(linewidth=0.4, alpha=0.5)
         columns[0].set_ylabel("mean MIoU")
-        if columns[0].lines:
-            columns[0].legend(frameon=False, fontsize=7)
+        legend_below(figure, columns[0], 6)
         figure.suptitle(
             "What noise asks for: fewer directions, a higher regularisation; t is that of training"
-            " scenes at"
-            " 60 dB"
+            " scenes at 60 dB"
         )
-        save_picture(figure, path)
+
+
+def _draw_by_snr(axes: Axes, group: Sequence[OperatingPoint], places: Sequence[float]) -> None:
+    """A line an SNR: images with full lines, discs with dashed ones."""
+    snrs_db = sorted({float(snr) for one in group for snr in one.scores.get("random", {})})
+    for snr_db in snrs_db:
+        for judged, style in (("image", "o-"), ("discs", "s--")):
+            where = Conditions(snr_db=snr_db, judged=judged)
+            ys = [one.accuracy(where) or float("nan") for one in group]
+            name = "image" if judged == "image" else "touches as discs"
+            axes.plot(
+                places, ys, style, color=SNR_COLOURS.get(snr_db, GREY), markersize=4,
+                linewidth=1.1, label=f"{name}, {snr_db:g} dB",
+            )  # fmt: skip
+    plain_axes(axes)
 
 
 def draw_samples(path: Path, front: Front) -> None:
-    """Accuracy against samples a measurement at each SNR, both scans; above, what a frame takes to
-    measure."""
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(9.6, 4.6), layout="constrained")
-        both = figure.subplots(1, 2, sharey=True)
-        groups = families(front.points, "samples", ("scan",))
+    """Accuracy against samples per measurement at each SNR, both scans; below, the time that a
+    frame takes to measure."""
+    groups = families(front.points, "samples", ("scan",))
+    with drawing(path, 9.6, 5.0) as figure:
+        both = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, scan in zip(both, ("full", "reciprocal"), strict=True):
             chosen = [
                 one for one in (groups[0] if groups else []) if one.configuration.scan == scan
             ]
-            snrs = sorted({float(snr) for one in chosen for snr in one.scores.get("random", {})})
-            for number, snr_db in enumerate(snrs):
-                for judged, style in (("image", "o-"), ("discs", "s--")):
-                    ys = [one.accuracy(Conditions(snr_db=snr_db, judged=judged)) for one in chosen]
-                    axes.plot([one.configuration.samples for one in chosen], ys, style,
-                        color=f"C{number}", markersize=4,
-                              linewidth=1.1, label=f"{judged}, {snr_db:g} dB")  # fmt: skip
+            samples = [one.configuration.samples for one in chosen]
+            _draw_by_snr(axes, chosen, samples)
             axes.set_xscale("log")
-            if chosen:
-                labels = [
-                    f"{one.configuration.samples}\n{one.costs['acquisition_us'] / 1000:.1f} ms"
-                    for one in chosen
-                ]
-                axes.set_xticks([one.configuration.samples for one in chosen], labels)
-                axes.minorticks_off()
-                axes.legend(frameon=False, fontsize=7)
-            axes.set_title(f"{scan} scan")
-            axes.set_xlabel("samples a measurement, and time to measure a frame")
-            axes.grid(linewidth=0.4, alpha=0.5)
+            axes.tick_params(which="minor", bottom=False)
+            times = [f"{one.costs['acquisition_us'] / 1000:.1f} ms" for one in chosen]
+            for place, time in zip(samples, times, strict=True):
+                axes.annotate(time, (place, 0.0), xycoords=("data", "axes fraction"),
+                    xytext=(0, 3), textcoords="offset points", ha="center", fontsize=7,
+                              color=GREY)  # fmt: skip
+            axes.set_title("full scan" if scan == "full" else "half scan (reciprocal rows once)")
+            axes.set_xlabel("samples per measurement (grey: time to measure a frame)")
+        both[0].margins(x=0.08)
+        if groups:
+            plain_ticks(both[0].xaxis, sorted({one.configuration.samples for one in groups[0]}))
+        low, high = both[0].get_ylim()
+        both[0].set_ylim(low - 0.06 * (high - low), high)
         both[0].set_ylabel("mean MIoU")
+        legend_below(figure, both[0], 3)
         figure.suptitle(
             "SNR against samples; the SNR is that of 80 samples, noise falls with their root"
         )
-        save_picture(figure, path)
 
 
 def draw_scenes(path: Path, front: Front) -> None:
     """The points of the front on every set of scenes at 60 dB: image, discs, exact count."""
-    matplotlib = load_matplotlib()
     points = best_points(front.points, Conditions()) or list(front.points)
     kinds: tuple[tuple[str, Callable[[dict[str, Any]], float]], ...] = (
         ("image MIoU", lambda score: float(score["image"]["mean"])),
-        ("discs MIoU", lambda score: float(score["discs"]["mean"])),
-        ("exact count", lambda score: float(score["exact_count"])),
+        ("MIoU of touches as discs", lambda score: float(score["discs"]["mean"])),
+        ("share of exact counts", lambda score: float(score["exact_count"])),
     )
     sets = list(points[0].scores)
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(
-            figsize=(12.0, 1.6 + 0.28 * len(points)), layout="constrained"
-        )
-        for number, (axes, (title, value)) in enumerate(
-            zip(figure.subplots(1, 3), kinds, strict=True)
-        ):
+    with drawing(path, 12.0, 1.8 + 0.28 * len(points)) as figure:
+        panels = figure.subplots(1, 3, sharey=True)
+        for axes, (title, value) in zip(panels, kinds, strict=True):
             table = [
                 [
                     value(score) if (score := one.score(Conditions(name))) else float("nan")
@@ -337,77 +302,30 @@ def draw_scenes(path: Path, front: Front) -> None:
                 ]
                 for one in points
             ]
-            axes.imshow(table, cmap="YlGnBu", vmin=0.5, vmax=1.0, aspect="auto")
+            shades = axes.imshow(table, cmap="cividis", vmin=0.5, vmax=1.0, aspect="auto")
             for row, values in enumerate(table):
                 for column, shown in enumerate(values):
-                    colour = "white" if shown > 0.82 else INK
                     axes.text(
-                        column,
-                        row,
-                        f"{shown:.2f}".lstrip("0"),
-                        ha="center",
-                        va="center",
-                        fontsize=7,
-                        color=colour,
-                    )
+                        column, row, f"{shown:.2f}".removeprefix("0"), ha="center", va="center",
+                        fontsize=7, color=INK if shown > 0.78 else "white",
+                    )  # fmt: skip
             axes.set_xticks(range(len(sets)), sets, rotation=40, ha="right", fontsize=8)
-            axes.set_yticks(
-                range(len(points)),
-                [one.name for one in points] if number == 0 else [""] * len(points),
-                fontsize=8,
-            )
             axes.set_title(title)
+        panels[0].set_yticks(range(len(points)), [one.name for one in points], fontsize=8)
+        figure.colorbar(shades, ax=panels, fraction=0.02, extend="min")
         figure.suptitle(
-            "The front of images on every set of scenes, 60 dB; t is that of random training scenes"
-            " for all"
+            "The Pareto-optimal settings for images on every set of scenes, 60 dB; t is that of"
+            " random training scenes for all"
         )
-        save_picture(figure, path)
-
-
-def draw_objective(path: Path, front: Front) -> None:
-    """The solver's own measure beside the picture's: MIoU over the relative duality gap, along more
-    and more iterations."""
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(6.4, 4.4), layout="constrained")
-        axes = figure.add_subplot()
-        for number, group in enumerate(families(front.points, "iterations")[:2]):
-            scores = [
-                (one, score)
-                for one in group
-                if (score := one.score(Conditions())) is not None and score["gap_rel"] > 0
-            ]
-            for judged, style in (("image", "o-"), ("discs", "s--")):
-                axes.plot([score["gap_rel"] for _, score in scores],
-                    [score[judged]["mean"] for _, score in scores], style,
-                          color=f"C{number}", markersize=4, linewidth=1.1,
-                          label=f"{judged}, {_base_name(group)}"
-                          f" (lambda {group[0].configuration.lambda_rel:g})")  # fmt: skip
-            for one, score in scores:
-                axes.annotate(f"{one.configuration.iterations}",
-                    (score["gap_rel"], score["image"]["mean"]), xytext=(3, -9),
-                              textcoords="offset points", fontsize=7)  # fmt: skip
-        axes.set_xscale("log")
-        axes.invert_xaxis()
-        axes.set_xlabel("relative duality gap, median (to the right: nearer the optimum)")
-        axes.set_ylabel("mean MIoU")
-        axes.grid(linewidth=0.4, alpha=0.5)
-        axes.set_title(
-            "The optimum of the objective is not the best picture; numbers: iterations", fontsize=9
-        )
-        if axes.lines:
-            axes.legend(frameon=False, fontsize=7)
-        save_picture(figure, path)
 
 
 DRAWN = {
-    "equal.png": draw_equal,
-    "equal-by-noise.png": draw_equal_by_noise,
-    "board.png": draw_board,
-    "front.png": draw_front,
-    "knobs.png": draw_knobs,
-    "noise.png": draw_noise,
-    "samples.png": draw_samples,
-    "scenes.png": draw_scenes,
-    "objective.png": draw_objective,
+    "equal.svg": draw_equal,
+    "equal-by-noise.svg": draw_equal_by_noise,
+    "board.svg": draw_board,
+    "front.svg": draw_front,
+    "knobs.svg": draw_knobs,
+    "noise.svg": draw_noise,
+    "samples.svg": draw_samples,
+    "scenes.svg": draw_scenes,
 }

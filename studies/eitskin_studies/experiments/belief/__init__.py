@@ -16,6 +16,7 @@ from eitskin_studies.experiments.belief.tables import (
     summary,
 )
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
+from eitskin_studies.harness.drawings import Drawing
 from eitskin_studies.pictures.belief_picture import draw_belief
 from eitskin_studies.worlds.score import CoreFinder
 from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
@@ -49,7 +50,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     return ExperimentOutcome(
         tables=(curve_table(sets), places_table(sets), counts_table(sets)),
         data={"sets": sets, "seed": seed, "scenes": count},
-        pictures={"belief.png": lambda path: draw_belief(path, sets)},
+        pictures={"belief.svg": Drawing(draw_belief, sets)},
         words={"conditions": conditions(settings, count), "summary": summary(sets)},
     )
 

@@ -1,7 +1,6 @@
 """Touches on a skin that is stretched or bent, found by the model of the flat one."""
 
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,9 +23,11 @@ from eitskin_studies.experiments.experiment import (
     Workspace,
 )
 from eitskin_studies.experiments.multitouch.counts import share
+from eitskin_studies.harness.drawings import Drawing
 from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.harness.sessions import converter_for
 from eitskin_studies.harness.snr import noise_deviation_v
+from eitskin_studies.pictures.worlds_pictures import draw_shares
 
 TITLE = "Touches on a skin that is stretched or bent, by the model of the flat one"
 USUAL, SNR_DB, UNTOUCHED = 100, 60.0, 50
@@ -70,7 +71,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     return ExperimentOutcome(
         (_table(scores),),
         {"scores": scores},
-        {"shares.png": partial(_draw, scores=scores)},
+        {"shares.svg": Drawing(draw_shares, _shares(scores))},
         {"sets": _words(len(drawn.scenes), seed)},
     )
 
@@ -148,13 +149,12 @@ def _words(scenes: int, seed: int) -> str:
     )
 
 
-def _draw(path: Path, scores: list[dict[str, Any]]) -> None:
-    from eitskin_studies.pictures.worlds_pictures import draw_shares
-
-    bars = []
+def _shares(scores: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The names, exact shares and false touches per scene that the picture shows."""
+    shown = []
     for one in scores:
         exact = share(one["exact"], one["scenes"])
+        values = [exact.mean, exact.low, exact.high]
         name = f"{one['name']}, {one['tare']} tare"
-        values = (exact.mean, exact.low, exact.high)
-        bars.append({"name": name, "exact": values, "false_per_scene": one["false"]})
-    draw_shares(path, bars)
+        shown.append({"name": name, "exact": values, "false_per_scene": one["false"]})
+    return shown

@@ -3,7 +3,6 @@ of a frame."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from eitskin_studies.experiments.electrodes.tables import all_tables, is_usual
 from eitskin_studies.experiments.electrodes.tuning import ITERATIONS, LAMBDAS, REGULARISATIONS
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.scored import number_text
+from eitskin_studies.harness.drawings import Drawing
 from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.harness.summary import summarise
 from eitskin_studies.pictures.electrodes_pictures import Bar, draw_counts, draw_patterns
@@ -100,8 +100,8 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         all_tables(results),
         {"seed": settings.seed, "noise_v": sigma_v, "cases": data},
         {
-            "counts.png": partial(draw_counts, bars=bars),
-            "patterns.png": partial(draw_patterns, bars=bars),
+            "counts.png": Drawing(draw_counts, [asdict(bar) for bar in bars]),
+            "patterns.png": Drawing(draw_patterns, [asdict(bar) for bar in bars]),
         },
         {"conditions": said, "best": _best(bars)},
     )

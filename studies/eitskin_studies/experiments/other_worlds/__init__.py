@@ -1,11 +1,15 @@
 """How the default reconstruction counts touches in worlds that its model knows nothing of."""
 
 import hashlib
+from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from eitskin.errors import FrameError
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scoring.matching import match
+from eitskin.skin.skin import Skin
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
 from eitskin_studies.experiments.other_worlds.ellipses import (
@@ -23,6 +27,7 @@ from eitskin_studies.experiments.other_worlds.tables import (
     images_table,
     summary,
 )
+from eitskin_studies.harness.drawings import Drawing
 from eitskin_studies.pictures.worlds_pictures import draw_examples, draw_shares
 from eitskin_studies.worlds.score import CoreFinder, score_set
 from eitskin_studies.worlds.simulate import WorldFactory, WorldScenes
@@ -94,14 +99,26 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             "scenes": count,
         },
         pictures={
-            "shares.png": lambda path: draw_shares(path, scores),
-            "examples.png": lambda path: draw_examples(path, examples, model.skin.outline),
+            "shares.svg": Drawing(draw_shares, _shares(scores)),
+            "examples.svg": Drawing(
+                draw_examples, {"rim_mm": _rim_mm(model.skin), "examples": examples}
+            ),
         },
         words={
             "conditions": conditions(settings, count, model.model_errors is not None),
             "summary": summary(scores),
         },
     )
+
+
+def _shares(scores: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [{key: one[key] for key in ("name", "exact", "false_per_scene")} for one in scores]
+
+
+def _rim_mm(skin: Skin) -> list[list[float]]:
+    places = np.linspace(0, skin.outline.perimeter_mm, 181)
+    rim: list[list[float]] = skin.outline.points_at(places).round(1).tolist()
+    return rim
 
 
 def _first_wrong(finder: CoreFinder, of: WorldScenes) -> dict[str, Any]:

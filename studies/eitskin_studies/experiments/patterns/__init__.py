@@ -3,7 +3,6 @@ with one gain or a gain for each row: the bound of a touch's place, and the prod
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from eitskin_studies.experiments.patterns.measuring import (
 from eitskin_studies.experiments.patterns.noise import NOISES
 from eitskin_studies.experiments.scored import number_text, share_text
 from eitskin_studies.harness.commit import last_commit
+from eitskin_studies.harness.drawings import Drawing
 from eitskin_studies.harness.sections import AS_EVERYWHERE
 from eitskin_studies.pictures.patterns_pictures import draw_patterns
 
@@ -83,7 +83,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             _scans(scans, beyond),
         ),
         data,
-        {"patterns.png": partial(draw_patterns, bounds=limits, product=medians)},
+        {"patterns.svg": Drawing(draw_patterns, {"bound": limits, "product": medians})},
         {"conditions": said, "best": _best(limits, medians)},
     )
 

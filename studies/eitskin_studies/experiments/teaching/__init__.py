@@ -5,7 +5,6 @@ splits."""
 import time
 from dataclasses import replace
 from functools import cache, partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +29,8 @@ from eitskin_studies.experiments.teaching.remounted import (
     updates,
 )
 from eitskin_studies.experiments.teaching.untaught import untaught
+from eitskin_studies.harness.drawings import Drawing
+from eitskin_studies.pictures.teaching_picture import draw_teaching
 
 TITLE = "A skin taught from presses at known places"
 FILE = "hydrogel_presses.npz"
@@ -95,7 +96,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     return ExperimentOutcome(
         (_by_count(taught, rivals, splits), _targets(taught, more, splits), update_table(updated)),
         data,
-        {"teaching.png": partial(_draw, data=data, splits=splits)},
+        {"teaching.png": Drawing(draw_teaching, _drawn(data, splits))},
         {"conditions": _conditions(splits)},
     )
 
@@ -327,25 +328,10 @@ def _targets(taught: dict[str, Any], more: dict[str, Any], splits: int) -> Table
     return Table("targets", ("what", "measured", "at least"), tuple(rows))
 
 
-def _draw(path: Path, data: dict[str, Any], splits: int) -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    from eitskin.view.panels import save_picture
-
-    figure = Figure(figsize=(7, 4.2), layout="constrained")
-    FigureCanvasAgg(figure)
-    panel = figure.subplots()
-    for name in ("taught", *BASELINES):
-        found = data["taught"] if name == "taught" else data["rivals"]
-        keys = [str(n) if name == "taught" else f"{name}/{n}" for n in COUNTS]
-        values = [_over_splits(found, key, "median", splits) for key in keys]
-        wide = 2.5 if name == "taught" else 1.2
-        panel.plot(COUNTS, values, "o-", lw=wide, ms=4, label=name)
-    panel.set(xscale="log", yscale="log", xlabel="presses taught", ylabel="median error, mm")
-    panel.set_xticks(COUNTS, [str(n) for n in COUNTS])
-    panel.set_yticks((1, 2, 5, 10, 20), ("1", "2", "5", "10", "20"))
-    panel.minorticks_off()
-    panel.spines[["top", "right"]].set_visible(False)
-    panel.legend(frameon=False)
-    save_picture(figure, path)
+def _drawn(data: dict[str, Any], splits: int) -> dict[str, Any]:
+    """Median errors in mm by method and number of presses."""
+    found = {"taught": [_over_splits(data["taught"], str(n), "median", splits) for n in COUNTS]}
+    for name in BASELINES:
+        keys = [f"{name}/{n}" for n in COUNTS]
+        found[name] = [_over_splits(data["rivals"], key, "median", splits) for key in keys]
+    return {"presses": list(COUNTS), "median_mm": found}
