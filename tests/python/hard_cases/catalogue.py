@@ -1,7 +1,7 @@
 """All hard cases, as ``cases.toml`` has them."""
 
 import ast
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from eitskin.config import load_toml
@@ -20,6 +20,7 @@ class Case:
     promise: str
     tests: list[str]
     picture: str | None = None
+    peers: list[str] = field(default_factory=list)
 
     @property
     def group(self) -> str:

@@ -13,6 +13,7 @@ from catalogue import CASES, GROUPS, HERE, ROOT, file_of
 PAGE = ROOT / "studies" / "results" / "hard-cases.md"
 PICTURES = ROOT / "studies" / "results" / "pictures"
 
+PEERS = PAGE.parent / "peers.md"
 MARGINS = HERE / "margins.json"
 
 HEAD = """# Hard cases
@@ -21,14 +22,19 @@ What makes the numbers of an EIT skin go wrong, what eitskin promises then, and 
 promise came to its bound. Each case has tests that fail where the promise does not hold
 ([cases.toml](../../tests/python/hard_cases/cases.toml)). Unless a case is about bytes or counters,
 it runs in float32 on the host (vector and plain C kernels) and on an emulated Cortex-M7; all three
-give the same bits. Where float64 was measured, it stands beside them.
+give the same bits, so one number stands for them. Where the same case also runs in float64, its
+number stands beside it; - means that it does not.
 
 `scripts/hard-cases` runs all cases and writes this page, its pictures and
-[margins.json](../../tests/python/hard_cases/margins.json) with what was measured. *Used* is the
+[margins.json](../../tests/python/hard_cases/margins.json) with what was measured. Numbers are the
 share of the bound that the worst measurement took: 0 % is perfect, 100 % is at the bound, and a
 test fails above it. Hardly any bound is statistical; seeds are in the tests. Cases without a number
-are right or wrong, such as a file that is refused. [Peers](peers.md) shows what other programs do
-in some of these cases.
+are right or wrong, such as a file that is refused.
+
+*Other programs* are numpy (one Gauss-Newton step), scikit-learn (Lasso) and pyEIT, where they were
+given the same frames: *worse* is an image with a lower MIoU and without a word, *right* one that
+loses at most .02 ([peers](peers.md) has the conditions and what eitskin does). None of them is made
+to judge frames.
 
 {groups}
 """
@@ -42,16 +48,6 @@ SAID = {
 }
 
 
-WHERE = {
-    ("M7", "host f32"): "float32",
-    ("M7", "host f32", "host f64"): "all",
-    ("host f32",): "float32, host",
-    ("host f64",): "float64",
-    ("M7",): "float32, M7",
-    ("host f32", "host f64"): "host",
-}
-
-
 def margins() -> dict[str, dict[str, tuple[float, str]]]:
     """Return the worst share of the bound and its text, by case and target."""
     found: dict[str, dict[str, tuple[float, str]]] = {}
@@ -60,22 +56,53 @@ def margins() -> dict[str, dict[str, tuple[float, str]]]:
     return found
 
 
-def used(of: dict[str, tuple[float, str]]) -> str:
-    """Say how much of the bound was used on each target, and of what."""
+def used(of: dict[str, tuple[float, str]], targets: tuple[str, ...]) -> str:
+    """Say how much of the bound was used on ``targets``, and of what; once where all agree."""
     said: dict[str, list[str]] = {}
-    for target, (share, text) in of.items():
-        said.setdefault(f"{100 * share:.2g} % ({text})", []).append(target)
-    return "; ".join(f"{WHERE[tuple(sorted(on))]} {text}" for text, on in said.items())
+    for target in targets:
+        if target in of:
+            share, text = of[target]
+            said.setdefault(f"{100 * share:.2g} % ({text})", []).append(target)
+    if len(said) == 1:
+        return next(iter(said))
+    return "; ".join(f"{', '.join(on)}: {text}" for text, on in said.items()) or "-"
+
+
+def peers() -> dict[str, dict[str, str]]:
+    """Return what each other program does in each row of the page of peers, in a word."""
+    lines = PEERS.read_text(encoding="utf-8").split("<!-- peers -->\n")[1].splitlines()
+    head, *rows = [[cell.strip() for cell in line.strip("|").split("|")]
+                   for line in lines if line.startswith("|")]  # fmt: skip
+    names = [name.split(",")[0] for name in head[1:-1]]
+    return {row[0]: dict(zip(names, map(_in_a_word, row[1:-1]), strict=True)) for row in rows[1:]}
+
+
+def _in_a_word(cell: str) -> str:
+    """What a cell says, without the exception's name and the MIoU of clean frames."""
+    return cell.split(":")[0].split(" (clean")[0].replace(", MIoU", ",")
+
+
+def others(rows: list[str], found: dict[str, dict[str, str]]) -> str:
+    """Say what the other programs do in these rows."""
+    said = []
+    for row in rows:
+        does = "; ".join(f"{name} {what}" for name, what in found[row].items())
+        said.append(f"{row}: {does}" if len(rows) > 1 else does)
+    return "<br>".join(said) or "-"
 
 
 def table(group: str, measured: dict[str, dict[str, tuple[float, str]]]) -> list[str]:
     """Return the lines of the table of a group."""
-    lines = ["| case | what goes wrong | promise | used, at worst |", "|---|---|---|---|"]
+    head = ("case", "what goes wrong", "promise", "float32: host and M7", "float64: host",
+            "other programs")  # fmt: skip
+    lines, found = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)], peers()
     for case in CASES:
         if case.group == group:
             test = f"../../{file_of(case.tests[0])}"
             name = f"[{case.id.split('/')[1]}]({test})"
-            cells = (name, case.what, case.promise, used(measured.get(case.id, {})) or "-")
+            of = measured.get(case.id, {})
+            cells = (name, case.what, case.promise, used(of, ("host f32", "M7")),
+                     used(of, ("host f64",)), others(case.peers, found))  # fmt: skip
             lines.append(f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |")
     return lines
 

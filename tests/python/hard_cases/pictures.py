@@ -18,8 +18,17 @@ from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
 from everywhere import on_host
 from small_models import prebuilt
 
-LOST = {"noise": "More noise", "rows left out": "Rows left out", "bits": "Fewer bits"}
-PRECISION = ("Worse conditioned matrices", "Smaller changes")
+BLUE, VERMILION = "#0072b2", "#d55e00"  # safe for colour-blind readers (Okabe and Ito)
+LINES = (("o-", BLUE), ("s--", VERMILION))
+LOST = {
+    "noise": "The image with more noise",
+    "rows left out": "The image without some rows",
+    "bits": "The image with fewer bits",
+}
+PRECISION = (
+    "float32 beside float64: worse conditioned matrices",
+    "float32 beside float64: smaller changes",
+)
 SHOWN = (  # group, which of it, sign looked for, title
     ("on an electrode", 0, "increase", "on an electrode"),
     ("centre", 0, "increase", "at the centre"),
@@ -71,6 +80,9 @@ def row_of(path: Path, count: int, height: float, label: str) -> Iterator[list[A
         figure = matplotlib.figure.Figure(figsize=(9.0, height), layout="constrained")
         row = [figure.add_subplot(1, count, k + 1) for k in range(count)]
         yield row
+        for axes in row:
+            axes.spines[["top", "right"]].set_visible(False)
+            axes.grid(linewidth=0.4, alpha=0.5)
         row[0].set_ylabel(label, color=INK)
         save_picture(figure, path)
 
@@ -80,7 +92,7 @@ def draw_losses(path: Path) -> None:
     errors = errors_of(on_host(all_steps())[1])
     with row_of(path, 3, 3.0, "change of the image,\nshare of its norm") as row:
         for axes, (kind, values) in zip(row, errors.items(), strict=True):
-            axes.plot(LEVELS[kind][1:], values[1:], "o-", color="#1f6fb4")
+            axes.plot(LEVELS[kind][1:], values[1:], "o-", color=BLUE)
             axes.set_ylim(0, 0.26)
             axes.set_xlabel(UNITS[kind], color=INK)
             axes.set_title(LOST[kind])
@@ -97,11 +109,12 @@ def draw_precision(path: Path) -> None:
         ("condition number of S", CONDITIONS, by_number, of_number),
         ("size of the change, golden frame: 1", CHANGES, sizes, of_size),
     )
-    with row_of(path, 2, 3.2, "float32 from float64,\nshare of the norm") as row:
+    with row_of(path, 2, 3.2, "difference, share of the norm") as row:
         for axes, (label, at, errors, lines), title in zip(row, panels, PRECISION, strict=True):
             axes.set_title(title)
-            for (name, said), style in zip(lines.items(), ("o-", "s--"), strict=True):
-                axes.loglog(at, [getattr(one, name) for one in errors], style, label=said)
+            for (name, said), (style, colour) in zip(lines.items(), LINES, strict=True):
+                values = [getattr(one, name) for one in errors]
+                axes.loglog(at, values, style, color=colour, label=said)
             axes.set_xlabel(label, color=INK)
             axes.legend(frameon=False)
         row[1].invert_xaxis()
@@ -109,8 +122,8 @@ def draw_precision(path: Path) -> None:
 
 DRAWN: dict[str, Callable[[Path], None]] = {
     "hard-touches.png": draw_touches,
-    "hard-losses.png": draw_losses,
-    "hard-precision.png": draw_precision,
+    "hard-losses.svg": draw_losses,
+    "hard-precision.svg": draw_precision,
 }
 
 
