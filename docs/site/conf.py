@@ -2,13 +2,20 @@
 command line and of the C headers. ``scripts/site`` calls it."""
 
 import re
+import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
 from sphinx.application import Sphinx
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from site_tables import with_downloads
+
 ROOT = Path(__file__).resolve().parents[2]
 HEADERS = ROOT / "build" / "site-headers"
+TABLES = ROOT / "build" / "site-tables"
+RESULTS = "studies/results/"
 BEHIND = re.compile(r"^( *)(\S.*[,;]) +/\* (.*) \*/$", re.MULTILINE)
 BEFORE = re.compile(r"^( *)/\* (?!clang-format)", re.MULTILINE)
 TOP = re.compile(r"^(?:#(?:ifndef|define) EITSKIN_\w+_H|#include .*)\n", re.MULTILINE)
@@ -44,9 +51,16 @@ def comment_to_paragraphs(app: object, lines: list[str], *_: object) -> None:
     lines[:] = out
 
 
+def link_tables(_: Sphinx, name: str, source: list[str]) -> None:
+    """Put a link to a CSV file below each table of a page of results."""
+    if name.startswith(RESULTS):
+        source[0] = with_downloads(name.removeprefix(RESULTS), source[0], TABLES, ROOT)
+
+
 def setup(app: Sphinx) -> None:
-    """Register what changes the comments of the C headers."""
+    """Register what changes the comments of the C headers and the pages of results."""
     app.connect("hawkmoth-process-docstring", comment_to_paragraphs)
+    app.connect("source-read", link_tables)
 
 
 write_marked_headers()

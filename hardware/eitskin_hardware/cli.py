@@ -13,7 +13,7 @@ MADE = Path("hardware/made")
 def add_parser(subparsers: Any) -> None:
     """Add ``hardware`` and its own subcommands."""
     parser = subparsers.add_parser(
-        "hardware", help="the instrument's circuit, its simulation, and the skin's container"
+        "hardware", help="make the instrument's circuit, its simulation, and the skin's container"
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     make = actions.add_parser(
@@ -25,7 +25,7 @@ def add_parser(subparsers: Any) -> None:
     make.set_defaults(run=run_make)
     container = actions.add_parser(
         "container",
-        help="a dish for a skin of gel: OpenSCAD source, drawings, and with --stl parts to print",
+        help="make a dish for a skin of gel: OpenSCAD source, drawings, with --stl parts to print",
         description=(
             "Write the OpenSCAD source of a dish whose inside is the skin's outline, with a hole"
             " for a post at each electrode, and of a drilling jig for a bought dish; the drawing"

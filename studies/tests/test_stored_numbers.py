@@ -32,8 +32,8 @@ def test_a_page_says_what_its_stored_file_says(path, tmp_path):
 def test_the_pages_of_the_first_screen_are_stored():
     linked = set(re.findall(r"\(studies/results/([\w-]+)\.md", README.read_text(encoding="utf-8")))
     assert {"tradeoff", "hard-cases", "other-worlds"} <= linked
-    # hard-cases.md is filled from margins.json and compared by its own test
-    by_hand = linked - {path.stem for path in STORED} - {"README", "hard-cases"}
+    # hard-cases.md is filled from margins.json and compared by its own test; corrections.md quotes
+    by_hand = linked - {path.stem for path in STORED} - {"README", "hard-cases", "corrections"}
     assert by_hand <= NOT_YET, f"run  studies/run {' '.join(sorted(by_hand))}"
 
 

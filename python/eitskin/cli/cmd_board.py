@@ -46,8 +46,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="lead through the first measurements on an instrument, stage by stage, and name what"
         " is wrong",
     )
-    for flag, default in (("--first-stage", STAGES[0]), ("--last-stage", STAGES[-1])):
-        parser.add_argument(flag, choices=STAGES, default=default, help="of bring-up")
+    for which, default in (("first", STAGES[0]), ("last", STAGES[-1])):
+        text = f"{which} stage of bring-up"
+        parser.add_argument(f"--{which}-stage", choices=STAGES, default=default, help=text)
     add_device(parser)
     named = parser.add_mutually_exclusive_group()
     named.add_argument(

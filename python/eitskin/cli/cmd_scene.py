@@ -43,7 +43,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     effects = what.add_parser(
         "effects", help="list the effects that a scene can name, or the parameters of one"
     )
-    option(effects, "name NAME", "an effect", nargs="?")
+    option(
+        effects,
+        "name NAME",
+        "the effect whose parameters are listed (default: list all effects)",
+        nargs="?",
+    )
     option(effects, "--json")
     effects.set_defaults(run=run_effects)
 

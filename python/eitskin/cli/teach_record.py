@@ -64,8 +64,9 @@ def add_parser(actions: Any) -> None:
         Path,
     )
     each = parser.add_mutually_exclusive_group()
-    for name in ("--depth-mm MM", "--force-n N"):
-        option(each, name, "for presses without a value in the plan", float, within=(0, 1e6))
+    for name, what in (("--depth-mm MM", "depth"), ("--force-n N", "force")):
+        text = f"{what} of the presses for which the plan has none"
+        option(each, name, text, float, within=(0, 1e6))
     add_device(parser, json=False)
     parser.set_defaults(run=run)
 

@@ -25,9 +25,9 @@ def add_board(what: Any) -> None:
         ),
     )
     option(parser, "--scenes", "random scenes", default=60)
-    option(parser, "--seed", "of the scenes", default=1)
-    option(parser, "--frames", "on the emulated NUCLEO, 0 for none", default=8)
-    option(parser, "--build DIR", "keep the build there, or take up an earlier one", Path)
+    option(parser, "--seed", "seed of the scenes", default=1)
+    option(parser, "--frames", "frames on the emulated NUCLEO, 0 for none", default=8)
+    option(parser, "--build DIR", "folder of the build; an earlier build there is used again", Path)
     add_page_option(parser, "board-cost")
     parser.set_defaults(run=run_board)
 
@@ -61,7 +61,7 @@ def add_time(what: Any) -> None:
     """``bench time``."""
     parser = what.add_parser(
         "time",
-        help="a frame's time on the board as a range, by two bounds of the Cortex-M7's time",
+        help="how long a frame takes on the board, between two bounds of the Cortex-M7's time",
         description=(
             "Run the firmware on the emulated NUCLEO-F767ZI while its time passes by an optimistic"
             " and by a pessimistic bound: dual issue, latencies, branches, caches, flash and bus"
@@ -70,7 +70,7 @@ def add_time(what: Any) -> None:
     )
     option(parser, "--image BIN", "firmware (default: the prebuilt one)", Path)
     option(parser, "--before BIN", "another firmware to compare with", Path)
-    option(parser, "--frames", "of each scan and bound", default=4)
+    option(parser, "--frames", "frames of each scan and bound", default=4)
     add_page_option(parser, "board-cost")
     parser.set_defaults(run=run_time)
 
@@ -91,7 +91,7 @@ def run_time(options: argparse.Namespace) -> int:
 
 def add_energy(what: Any) -> None:
     """``bench energy``."""
-    parser = what.add_parser("energy", help="energy a frame, estimated from data sheets")
+    parser = what.add_parser("energy", help="estimate the energy of a frame from data sheets")
     add_page_option(parser, "board-cost")
     parser.set_defaults(run=run_energy)
 
@@ -107,10 +107,10 @@ def run_energy(options: argparse.Namespace) -> int:
 def add_view(what: Any) -> None:
     """``bench view``."""
     parser = what.add_parser(
-        "view", help="the live page: the server's share of a core, frame to pixel in Chromium"
+        "view", help="measure the live page: the server's share of a core, frame to pixel"
     )
-    option(parser, "--seconds", "for each number of pages", default=30.0)
-    option(parser, "--load", "eight pages only, and six sinks beside")
+    option(parser, "--seconds", "seconds for each number of pages", default=30.0)
+    option(parser, "--load", "measure eight pages only, and six sinks at the same time")
     add_page_option(parser, "outputs")
     parser.set_defaults(run=run_view)
 
@@ -137,16 +137,16 @@ def add_outputs(what: Any) -> None:
     """``bench outputs``."""
     parser = what.add_parser(
         "outputs",
-        help="from a contact to the UDP packet and the TUIO message; load of six sinks",
+        help="time from a contact to the UDP packet and TUIO message; load of six sinks",
         description=(
             "Tap an emulated board's skin, and say how long each contact takes through scan, solve,"
             " link, host and sink; then stream to six sinks at once."
         ),
     )
-    option(parser, "--taps", "of the emulated board; about 4 s each", default=24)
-    option(parser, "--seconds", "of each sink alone", default=20.0)
+    option(parser, "--taps", "taps on the emulated board; about 4 s each", default=24)
+    option(parser, "--seconds", "seconds of each sink alone", default=20.0)
     option(parser, "--load", "seconds of six sinks at once, 0 for none", default=20.0)
-    option(parser, "--seed", "of contacts and noise", default=1)
+    option(parser, "--seed", "seed of contacts and noise", default=1)
     add_page_option(parser, "outputs")
     parser.set_defaults(run=run_outputs)
 
@@ -174,17 +174,17 @@ def add_latency(what: Any) -> None:
     """``bench latency``."""
     parser = what.add_parser(
         "latency",
-        help="from contact to report of presses that land and lift in the middle of scans",
+        help="time from contact to report, of presses that land and lift during scans",
         description=(
             "Press a simulated skin at random times and places, fast and slowly, while each row is"
             " measured at its own instant; say when a press is first reported, how far off, and"
             " what is reported that is not there. Solve and link are an emulated board's."
         ),
     )
-    option(parser, "--presses", "of each rise, on the simulated board", default=200)
-    option(parser, "--emulated", "presses of the emulated board, about 10 s each", default=12)
-    option(parser, "--seed", "of presses and noise", default=1)
-    option(parser, "--order ORDER", 'again with drives in this order, such as "by 7"')
+    option(parser, "--presses", "presses of each rise, on the simulated board", default=200)
+    option(parser, "--emulated", "presses on the emulated board, about 10 s each", default=12)
+    option(parser, "--seed", "seed of presses and noise", default=1)
+    option(parser, "--order ORDER", 'measure also with drives in this order, such as "by 7"')
     option(parser, "--picture FILE.png", "draw when presses were reported", Path)
     add_page_option(parser, "latency")
     parser.set_defaults(run=run_latency)

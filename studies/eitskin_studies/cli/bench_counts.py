@@ -15,17 +15,17 @@ def add_diagnostics(what: Any) -> None:
     """``bench diagnostics``."""
     parser = what.add_parser(
         "diagnostics",
-        help="how often faults are called by their name, and what they cost the image",
+        help="count how often faults are named rightly, and what they cost the image",
         description=(
             "Spoil frames of random scenes in every way that docs/reference/diagnostics.md names,"
-            " count how often that is said in that very frame, and compare the image with that of"
-            " the same frame without the fault; some five minutes."
+            " count how often the fault is named in that very frame, and compare the image with"
+            " that of the same frame without the fault. It takes some five minutes."
         ),
     )
-    option(parser, "--scenes", "that every fault is put on", default=640)
-    option(parser, "--crowds", "scenes of each number of touches", default=24)
-    option(parser, "--imperfect", "scenes of each front end", default=40)
-    option(parser, "--seed", "of scenes and noise", default=4001)
+    option(parser, "--scenes", "scenes, each with every fault", default=640)
+    option(parser, "--crowds", "scenes for each number of touches", default=24)
+    option(parser, "--imperfect", "scenes for each front end", default=40)
+    option(parser, "--seed", "seed of scenes and noise", default=4001)
     add_page_option(parser, "diagnostics")
     parser.set_defaults(run=run_diagnostics)
 
@@ -55,14 +55,14 @@ def add_gestures(what: Any) -> None:
     """``bench gestures``."""
     parser = what.add_parser(
         "gestures",
-        help="gestures of simulated fingers: how many are reported correctly, and how late",
+        help="count the gestures of simulated fingers that are reported rightly, and how late",
         description=(
             "Draw sessions of taps, holds, swipes, pinches, spreads, turns, drags and presses,"
-            " simulate a board that scans meanwhile, and judge what the C core tells."
+            " simulate a board that scans meanwhile, and score what the C core reports."
         ),
     )
-    option(parser, "--sessions", "of 27 each", default=60)
-    option(parser, "--seed", "of all that is random", default=7001)
+    option(parser, "--sessions", "sessions of 27 gestures each", default=60)
+    option(parser, "--seed", "seed of all that is random", default=7001)
     option(
         parser,
         "--role",
@@ -71,7 +71,7 @@ def add_gestures(what: Any) -> None:
         default="judging",
     )
     option(parser, "--snr-db DB", None, float, nargs="+", default=[60.0, 40.0])
-    option(parser, "--cache DIR", "keeps the simulated frames", Path)
+    option(parser, "--cache DIR", "folder that keeps the simulated frames", Path)
     add_page_option(parser, "gestures")
     parser.set_defaults(run=run_gestures)
 
@@ -103,14 +103,14 @@ def add_worlds(what: Any) -> None:
     """``bench worlds``."""
     parser = what.add_parser(
         "worlds",
-        help="touches counted in worlds that the model does not share",
+        help="count touches on skins that differ from the model",
         description=(
-            "Simulate sets of scenes on another mesh, with touches, sheets, electrodes and drifts"
-            " that the model knows nothing of, and count the touches that the C core finds."
+            "Simulate sets of scenes on another mesh, with touches, skins, electrodes and drifts"
+            " that the model does not describe, and count the touches that the C core finds."
         ),
     )
-    option(parser, "--scenes", "of each set", default=100)
-    option(parser, "--seed", "of all that is random", default=1)
+    option(parser, "--scenes", "scenes of each set", default=100)
+    option(parser, "--seed", "seed of all that is random", default=1)
     option(
         parser,
         "--family",
@@ -121,11 +121,11 @@ def add_worlds(what: Any) -> None:
     option(
         parser, "--sets NAME,...", "these alone; no_touch* names all that begin so (default: all)"
     )
-    option(parser, "--snr-db DB", "instead of each set's own", float)
+    option(parser, "--snr-db DB", "SNR, in place of each set's own", float)
     option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
     option(parser, "--option NAME=VALUE", "an option of the core; may be repeated", action="append")
-    option(parser, "--cache DIR", "keeps the simulated frames", Path)
-    option(parser, "--list", "name the sets")
+    option(parser, "--cache DIR", "folder that keeps the simulated frames", Path)
+    option(parser, "--list", "list the sets, and end")
     option(parser, "--json")
     parser.set_defaults(run=run_worlds)
 
@@ -163,20 +163,22 @@ def add_limit(what: Any) -> None:
     """``bench limit``."""
     parser = what.add_parser(
         "limit",
-        help="errors of touches beside the Cramer-Rao bound",
+        help="compare the errors of touches with the Cramer-Rao bound",
         description=(
             "Print the Cramer-Rao bound of a touch's place, the error of the C core and their"
             " ratio, by place, contrast, SNR, kind of touch and drive pattern. Frames are exact."
             " Building a model for another pattern takes some minutes."
         ),
     )
-    option(parser, "--scenes", "of each set", default=100)
-    option(parser, "--seed", "of all that is random", default=1)
+    option(parser, "--scenes", "scenes of each set", default=100)
+    option(parser, "--seed", "seed of all that is random", default=1)
     option(parser, "--sets NAME,...", "these sets alone (default: all)")
     option(parser, "--patterns NAME,...", "these drive patterns alone (default: all)")
     option(parser, "--model MODEL.eitm", "default: the prebuilt model of the paper's skin", Path)
-    option(parser, "--cache DIR", "keeps the exact frames and the models of other patterns", Path)
-    option(parser, "--picture PNG", "draw it", Path)
+    option(
+        parser, "--cache DIR", "folder that keeps exact frames, and models of other patterns", Path
+    )
+    option(parser, "--picture PNG", "draw the errors and the bound", Path)
     add_page_option(parser, "limit")
     parser.set_defaults(run=run_limit)
 
@@ -220,14 +222,14 @@ def add_peers(what: Any) -> None:
     """``bench peers``."""
     parser = what.add_parser(
         "peers",
-        help="what numpy, scikit-learn, pyEIT and the core do with spoilt frames",
+        help="see what numpy, scikit-learn, pyEIT and the core do with spoilt frames",
         description=(
             "Spoil the frames of random scenes in eleven ways, and say what each program answers:"
             " the right image, a worse one, a name for the fault, NaN or an error."
         ),
     )
-    option(parser, "--scenes", "that every fault is put on", default=20)
-    option(parser, "--seed", "of scenes and noise", default=1)
+    option(parser, "--scenes", "scenes, each with every fault", default=20)
+    option(parser, "--seed", "seed of scenes and noise", default=1)
     add_page_option(parser, "peers")
     parser.set_defaults(run=run_peers)
 

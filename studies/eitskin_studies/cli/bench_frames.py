@@ -13,7 +13,7 @@ from eitskin_studies.cli.bench_shared import add_page_option, check_within, prog
 def add_frame(what: Any) -> None:
     """``bench frame``."""
     parser = what.add_parser(
-        "frame", help="one frame through cffi: p50, p99, share outside C, beside numpy"
+        "frame", help="time one frame through cffi: p50, p99, share outside C; and numpy"
     )
     option(parser, "--runs", default=2000)
     option(parser, "--json")
@@ -34,10 +34,10 @@ def run_frame(options: argparse.Namespace) -> int:
 def add_solve(what: Any) -> None:
     """``bench solve``."""
     parser = what.add_parser(
-        "solve", help="the solve alone: time to a suboptimality, beside other solvers"
+        "solve", help="time the solve alone, to a suboptimality, beside other solvers"
     )
-    option(parser, "--scenes", "problems of each model", default=20)
-    option(parser, "--seed", "of the scenes", default=3)
+    option(parser, "--scenes", "problems for each model", default=20)
+    option(parser, "--seed", "seed of the scenes", default=3)
     option(parser, "--rounds", "interleaved rounds", default=11)
     option(parser, "--picture PNG", "draw suboptimality against MIoU instead", Path)
     option(parser, "--json")
@@ -72,7 +72,7 @@ def run_solve(options: argparse.Namespace) -> int:
 def add_batches(what: Any) -> None:
     """``bench batches``."""
     parser = what.add_parser(
-        "batches", help="batches of frames over threads, beside one after another"
+        "batches", help="time batches of frames, on several threads and on one"
     )
     option(parser, "--frames", default=1000)
     option(parser, "--rounds", default=9)
@@ -98,14 +98,14 @@ def add_kernels(what: Any) -> None:
     """``bench kernels``."""
     parser = what.add_parser(
         "kernels",
-        help="each C kernel beside the machine's measured peaks; needs a checkout",
+        help="time each C kernel beside the machine's measured peaks; needs a checkout",
         description=(
             "Build a C program from the source checkout that times every kernel beside this"
             " machine's peaks of memory and arithmetic, in turns, and say how far from its limit"
             " each is."
         ),
     )
-    option(parser, "--rank", "numbers of a column", default=64)
+    option(parser, "--rank", "numbers in a column", default=64)
     option(parser, "--columns", default=812)
     option(parser, "--rounds", default=41)
     option(parser, "--json")
@@ -126,11 +126,11 @@ def run_kernels(options: argparse.Namespace) -> int:
 def add_growth(what: Any) -> None:
     """``bench growth``."""
     parser = what.add_parser(
-        "growth", help="a frame's time and MACs against pixels, rows, rank, touches and electrodes"
+        "growth", help="time and MACs of a frame by pixels, rows, rank, touches and electrodes"
     )
     option(parser, "--rounds", default=15)
-    option(parser, "--cache DIR", "keeps the models (default: beside other temporary files)", Path)
-    option(parser, "--picture PNG", "draw it", Path)
+    option(parser, "--cache DIR", "folder that keeps the models (default: a temporary one)", Path)
+    option(parser, "--picture PNG", "draw time and MACs", Path)
     add_page_option(parser)
     parser.set_defaults(run=run_growth)
 

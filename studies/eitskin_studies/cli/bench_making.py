@@ -11,7 +11,7 @@ from eitskin_studies.cli.bench_shared import add_page_option, check_within, prog
 def add_jacobian(what: Any) -> None:
     """``bench jacobian``."""
     parser = what.add_parser(
-        "jacobian", help="building: Jacobian beside pyEIT's, and the whole model"
+        "jacobian", help="time the building of a Jacobian, beside pyEIT's, and of a whole model"
     )
     option(parser, "--json")
     parser.set_defaults(run=run_jacobian)
@@ -30,10 +30,10 @@ def add_effects(what: Any) -> None:
     """``bench effects``."""
     parser = what.add_parser(
         "effects",
-        help="scenes: time, memory, work and modules with no effect, with each alone, with all",
+        help="time, memory, work and modules of scenes without effects, with each, with all",
     )
     option(parser, "--frames", default=100)
-    option(parser, "--rounds", "interleaved; the median counts", default=5)
+    option(parser, "--rounds", "interleaved rounds; the median counts", default=5)
     add_page_option(parser, "scene-cost")
     parser.set_defaults(run=run_effects)
 
@@ -64,11 +64,11 @@ def run_effects(options: argparse.Namespace) -> int:
 def add_scenes(what: Any) -> None:
     """``bench scenes``."""
     parser = what.add_parser(
-        "scenes", help="scenes: frames/s of a moving touch, static scenes/s of a dataset"
+        "scenes", help="time scenes: frames/s of a moving touch, scenes/s of a dataset"
     )
-    option(parser, "--frames", "of the moving touch", default=400)
-    option(parser, "--scenes", "of the dataset", default=500)
-    option(parser, "--elements", "of the mesh", default=3000)
+    option(parser, "--frames", "frames of the moving touch", default=400)
+    option(parser, "--scenes", "scenes of the dataset", default=500)
+    option(parser, "--elements", "elements of the mesh", default=3000)
     option(parser, "--json")
     parser.set_defaults(run=run_scenes)
 

@@ -25,7 +25,7 @@ def add_parser(subparsers: Any) -> None:
     option(parser, "--skin TOML", "skin description (default: the paper's 194 mm disk)", Path)
     option(parser, "--scenes N", "test scenes", default=180)
     option(parser, "--train N", "training scenes", default=60)
-    option(parser, "--seed S", "of all that is random", default=1)
+    option(parser, "--seed S", "seed of all that is random", default=1)
     option(parser, "--snr-db DB", "20 log10(rms(V0)/sigma)", default=60.0)
     option(
         parser,
@@ -37,7 +37,7 @@ def add_parser(subparsers: Any) -> None:
     option(
         parser,
         "--shape",
-        "of the touches, also of training scenes; ellipses and fingers with axes 1.4 to 2.2",
+        "shape of all touches; ellipses and fingers have axes of 1.4 to 2.2",
         choices=("disc", "ellipse", "hertz", "gauss", "finger"),
         default="disc",
     )
@@ -53,7 +53,7 @@ def add_parser(subparsers: Any) -> None:
         " scikit-learn)",
         Path,
     )
-    option(parser, "--threads N", "of the C core's frames", default=1)
+    option(parser, "--threads N", "threads for the C core's frames", default=1)
     option(parser, "--json", "print JSON, with the curves over the threshold")
     option(parser, "--csv FILE", "write the numbers of every scene", Output)
     option(parser, "--picture PNG", "draw test scenes as each method shows them", Output)

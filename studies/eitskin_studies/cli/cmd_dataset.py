@@ -16,7 +16,7 @@ def add_parser(subparsers: Any) -> None:
     """Add ``dataset``."""
     dataset = subparsers.add_parser(
         "dataset",
-        help="many seeded scenes drawn from ranges, in chunks; an interrupted run resumes",
+        help="simulate many seeded scenes that are drawn from ranges; an interrupted run resumes",
         description=(
             "Draw scenes from the table [dataset] of a scene and simulate them into a folder of"
             " chunks. The result depends on the description and the seed only. Run the same command"
@@ -24,13 +24,17 @@ def add_parser(subparsers: Any) -> None:
         ),
     )
     option(dataset, "scene SCENE", SCENE_HELP)
-    option(dataset, "--count N", "how many scenes", int, required=True)
+    option(dataset, "--count N", "number of scenes", int, required=True)
     option(dataset, "--seed S", default=1)
     option(dataset, "--ranges TOML", "file with [dataset] in place of the scene's own", Path)
     option(dataset, "-o --output FOLDER", None, Path, required=True)
-    option(dataset, "--jobs J", "processes", default=1)
-    option(dataset, "--chunk N", "scenes a file", default=100)
-    option(dataset, "--scheduler ADDRESS", "a Dask scheduler, as tcp://HOST:8786")
+    option(dataset, "--jobs J", "number of processes", default=1)
+    option(dataset, "--chunk N", "scenes in each file", default=100)
+    option(
+        dataset,
+        "--scheduler ADDRESS",
+        "compute on a Dask cluster: its scheduler, such as tcp://HOST:8786",
+    )
     option(dataset, "--json")
     dataset.set_defaults(run=run)
 

@@ -11,33 +11,39 @@ from eitskin.errors import UsageError
 def add_parser(subparsers: Any) -> None:
     """Add ``draw`` and its own subcommands."""
     parser = subparsers.add_parser(
-        "draw", help="pictures of the documentation, and the examples' drawings"
+        "draw", help="make pictures of the documentation, and drawings of the examples"
     )
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
-    effect = what.add_parser("effect", help="what one effect does: its law, and what it adds")
-    option(effect, "name NAME", "of the effect (eitskin scene effects)")
+    effect = what.add_parser(
+        "effect", help="draw the law of one effect, and what it adds to a frame"
+    )
+    option(effect, "name NAME", "name of the effect (eitskin scene effects)")
     option(effect, "-o --output PNG", None, Path, required=True)
     effect.set_defaults(run=run_effect)
-    touch = what.add_parser("touch", help="a touch's law or shape, and what it does to a frame")
-    option(touch, "name NAME", "of the law or shape (docs/guide/scenes.md)")
+    touch = what.add_parser(
+        "touch", help="draw a touch's law or shape, and what it does to a frame"
+    )
+    option(touch, "name NAME", "name of the law or shape (docs/guide/scenes.md)")
     option(touch, "-o --output PNG", None, Path, required=True)
     touch.set_defaults(run=run_touch)
-    miou = what.add_parser("miou", help="what MIoU measures, and images at .75, .85 and .95")
+    miou = what.add_parser(
+        "miou", help="draw what MIoU measures, and images at about .75, .85, .95"
+    )
     option(miou, "-o --output PNG", None, Path, required=True)
     miou.set_defaults(run=run_miou)
-    wiring = what.add_parser("wiring", help="the wiring of board, multiplexers and skin")
+    wiring = what.add_parser("wiring", help="draw the wiring of board, multiplexers and skin")
     option(wiring, "-o --output PNG", None, Path, required=True)
     wiring.set_defaults(run=run_wiring)
-    live = what.add_parser("live", help="the live page before a simulated skin, moving")
+    live = what.add_parser("live", help="film the live page of a simulated skin")
     option(live, "-o --output WEBP", None, Path, required=True)
-    option(live, "--robot", "instead the arm of examples/robot in three dimensions, one picture")
+    option(live, "--robot", "draw one picture of the arm of examples/robot instead")
     live.set_defaults(run=run_live)
     page = what.add_parser(
-        "page", help="the pictures of a page of results again, from their stored numbers"
+        "page", help="draw the pictures of a page of results again, from their stored numbers"
     )
-    option(page, "name NAME", "of the page: studies/results/NAME.md")
+    option(page, "name NAME", "name of the page: studies/results/NAME.md")
     page.set_defaults(run=run_page)
-    examples = what.add_parser("examples", help="hand.svg and forearm.dxf")
+    examples = what.add_parser("examples", help="write hand.svg and forearm.dxf")
     option(examples, "-o --output FOLDER", None, Path, required=True)
     examples.set_defaults(run=run_examples)
 

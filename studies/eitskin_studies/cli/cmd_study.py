@@ -13,20 +13,20 @@ def add_parser(subparsers: Any) -> None:
     """Add ``study``."""
     parser = subparsers.add_parser(
         "study",
-        help="the paper's experiments, and past them: data, tables, pictures, a page",
+        help="run one experiment of the results: data, tables, pictures, and its page",
         description=(
-            "Run one experiment whole: seeded, with progress, every result kept as it comes, so"
-            " that a run that is stopped, even by kill -9, goes on where it was. `eitskin study"
-            " list` names them."
+            "Run one experiment from its seed. Every result is kept as it comes: a run that was"
+            " stopped, even by kill -9, continues when it is called again. `eitskin study list`"
+            " names the experiments."
         ),
     )
-    option(parser, "name NAME", "of the experiment, or: list")
-    option(parser, "-o --output DIR", "folder of its results (default: out/NAME)", Path)
-    option(parser, "--seed S", "of all that is random", default=1)
-    option(parser, "--share X", "of the usual number of scenes", default=1.0)
-    option(parser, "--data DIR", "measured frames, for the study on them", Path)
+    option(parser, "name NAME", "name of the experiment, or: list")
+    option(parser, "-o --output DIR", "folder of the results (default: out/NAME)", Path)
+    option(parser, "--seed S", "seed of all that is random", default=1)
+    option(parser, "--share X", "share of the usual number of scenes", default=1.0)
+    option(parser, "--data DIR", "folder of measured frames, for studies of such frames", Path)
     option(parser, "--page FILE.md", "fill the marked places of this page", existing_page)
-    option(parser, "--no-pictures", "tables and data only")
+    option(parser, "--no-pictures", "make tables and data only")
     option(parser, "--json", "print the data instead of tables")
     parser.set_defaults(run=run)
 

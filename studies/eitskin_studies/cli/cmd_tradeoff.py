@@ -21,28 +21,28 @@ def add_parser(subparsers: Any) -> None:
         description=(
             "Run configurations from very cheap to best over seeded sets of scenes: how good"
             " images, touches and forces are and what they cost. The mask's threshold is chosen on"
-            " training scenes; all numbers are of others. A run that was stopped goes on where it"
-            " ended when called again with the same folder."
+            " training scenes; all numbers are of others. A run that was stopped continues when"
+            " it is called again with the same folder."
         ),
     )
     option(run, "-o --output DIR", None, Path, default=Path("tradeoff"))
     option(run, "--set FILE.toml", "your own configurations (default: built in)", Path)
     option(run, "--only NAME,...", "these configurations only")
-    option(run, "--scenes N", "of the set 'random'", default=180)
+    option(run, "--scenes N", "scenes of the set 'random'", default=180)
     option(run, "--train N", "training scenes", default=60)
-    option(run, "--set-scenes N", "of each other set", default=30)
+    option(run, "--set-scenes N", "scenes of each other set", default=30)
     option(run, "--sets NAME,...", "sets beside 'random' (default: those of discs; '' for none)")
-    option(run, "--snr-db DB,...", "60 must be among them", default="40,60,80")
-    option(run, "--seed S", "of all that is random", default=1)
-    option(run, "--elements N", "of the frames' mesh", default=11_000)
+    option(run, "--snr-db DB,...", "SNRs to measure; 60 must be among them", default="40,60,80")
+    option(run, "--seed S", "seed of all that is random", default=1)
+    option(run, "--elements N", "elements of the frames' mesh", default=11_000)
     option(run, "--counted N", "scenes emulated to count instructions; 0: none", default=24)
-    option(run, "--rounds N", "in which times are taken on this host; 0: none", default=25)
-    option(run, "--random-skins N", "of the models' errors; 0: without", default=500)
-    option(run, "--no-peers", "no other methods on the same scenes")
+    option(run, "--rounds N", "rounds that are timed on this host; 0: none", default=25)
+    option(run, "--random-skins N", "random skins for the models' errors; 0: none", default=500)
+    option(run, "--no-peers", "leave out other methods on the same scenes")
     option(run, "--front FRONT.json", "also write what the package ships of the results", Path)
     option(run, "--recorded FRONT.json", "also write what the page shows", Path)
     option(run, "--page PAGE.md", "also put tables and pictures into this page", existing_page)
-    option(run, "--no-pictures", "tables only")
+    option(run, "--no-pictures", "make tables only")
     option(run, "--json", "print the results as JSON")
     run.set_defaults(run=run_run)
 

@@ -18,23 +18,24 @@ MARGINS = HERE / "margins.json"
 
 HEAD = """# Hard cases
 
-What makes the numbers of an EIT skin go wrong, what eitskin promises then, and how near each
-promise came to its bound. Each case has tests that fail where the promise does not hold
-([cases.toml](../../tests/python/hard_cases/cases.toml)). Unless a case is about bytes or counters,
-it runs in float32 on the host (vector and plain C kernels) and on an emulated Cortex-M7; all three
-give the same bits, so one number stands for them. Where the same case also runs in float64, its
-number stands beside it; - means that it does not.
+This page lists what makes the numbers of an EIT skin go wrong, what eitskin promises then, and how
+near to its bound each promise came. Each case has tests that fail if the promise is broken
+([cases.toml](../../tests/python/hard_cases/cases.toml)). Cases about numbers run in float32 on the
+host (vector and plain C kernels) and on an emulated Cortex-M7; all three give the same bits, so one
+number stands for them. Cases about tracking run on the host alone, which their numbers say; so do
+cases about bytes and counters. If the same case also runs in float64, its number stands beside it;
+- means that it does not.
 
 `scripts/hard-cases` runs all cases and writes this page, its pictures and
 [margins.json](../../tests/python/hard_cases/margins.json) with what was measured. Numbers are the
 share of the bound that the worst measurement took: 0 % is perfect, 100 % is at the bound, and a
 test fails above it. Hardly any bound is statistical; seeds are in the tests. Cases without a number
-are right or wrong, such as a file that is refused.
+are right or wrong, such as a file that is rejected.
 
-*Other programs* are numpy (one Gauss-Newton step), scikit-learn (Lasso) and pyEIT, where they were
-given the same frames: *worse* is an image with a lower MIoU and without a word, *right* one that
-loses at most .02 ([peers](peers.md) has the conditions and what eitskin does). None of them is made
-to judge frames.
+*Other programs* are numpy (one Gauss-Newton step), scikit-learn (Lasso) and pyEIT, if they were
+given the same frames. *Worse* means that the image has a lower MIoU, and that nothing was reported;
+*right* means that it loses at most .02. [Peers](peers.md) has the conditions, and what eitskin does.
+None of these programs is made to judge frames.
 
 {groups}
 """
@@ -57,14 +58,16 @@ def margins() -> dict[str, dict[str, tuple[float, str]]]:
 
 
 def used(of: dict[str, tuple[float, str]], targets: tuple[str, ...]) -> str:
-    """Say how much of the bound was used on ``targets``, and of what; once where all agree."""
+    """Say how much of the bound was used on ``targets``, and of what: once if all agree."""
     said: dict[str, list[str]] = {}
     for target in targets:
         if target in of:
             share, text = of[target]
-            said.setdefault(f"{100 * share:.2g} % ({text})", []).append(target)
+            percent = f"{100 * share:.0f}" if share >= 0.1 else f"{100 * share:.2g}"
+            said.setdefault(f"{percent} % ({text})", []).append(target)
     if len(said) == 1:
-        return next(iter(said))
+        ((text, on),) = said.items()
+        return text if tuple(on) == targets else f"{', '.join(on)} alone: {text}"
     return "; ".join(f"{', '.join(on)}: {text}" for text, on in said.items()) or "-"
 
 

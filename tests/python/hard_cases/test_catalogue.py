@@ -1,7 +1,9 @@
 """The catalogue, its tests and its page belong together."""
 
+import re
+
 import pictures
-from catalogue import CASES, exists, hard_tests
+from catalogue import CASES, ROOT, exists, file_of, hard_tests
 
 import page
 
@@ -29,6 +31,14 @@ def test_margins_are_those_of_the_catalogue():
     assert set(page.margins()) <= {case.id for case in CASES}
     worst = [share for of in page.margins().values() for share, _ in of.values()]
     assert len(worst) > 60 and max(worst) <= 1.0
+
+
+def test_margins_of_the_m7_come_from_tests_that_run_there():
+    on_m7 = re.compile(r"\.everywhere\b|margins\.of\(|same_everywhere|\"M7\"")
+    for case in CASES:
+        if "M7" in page.margins().get(case.id, {}):
+            texts = [(ROOT / file_of(test)).read_text(encoding="utf-8") for test in case.tests]
+            assert any(on_m7.search(text) for text in texts), case.id
 
 
 def test_pictures_exist():

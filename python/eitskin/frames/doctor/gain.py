@@ -121,7 +121,7 @@ def check_unit(case: Case, unit_known: bool) -> CheckOutcome:
     known."""
     if case.skin is None:
         return CheckOutcome(
-            inconclusive=("the unit: it needs a skin with its conductivity (--skin)",)
+            inconclusive=("the unit. Name the skin with its conductivity (--skin)",)
         )
     strong = case.trusted & (np.abs(case.predicted) > WEAK_PER_RMS * rms(case.predicted))
     if not strong.any():

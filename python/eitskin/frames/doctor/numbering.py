@@ -21,8 +21,8 @@ CLEARLY = 0.5
 LIKELY = 0.9
 SHOWN = 3
 ALL_ALIKE = (
-    "where electrode 0 is and in which direction the numbers run: on this symmetric skin, with this"
-    " protocol, an untouched frame is the same for all numberings"
+    "where electrode 0 is, and in which direction the numbers run. On this symmetric skin, with"
+    " this protocol, an untouched frame is the same for all numberings"
 )
 
 

@@ -26,12 +26,12 @@ def check_orientation(case: Case, inconclusive: tuple[str, ...]) -> CheckOutcome
     questions that the untouched frame left open."""
     measured, transfers = _changes(case)
     if not measured:
-        why = "the known touches have no sign or no change"
+        why = "The known touches have no sign or no change"
         if case.frames.touch_frame is None:
-            why = "say where a touch was (--touch X,Y)"
+            why = "Say where a touch was (--touch X,Y)"
         elif case.skin is None:
-            why = "known touches need the skin (--skin)"
-        return CheckOutcome(inconclusive=tuple(f"{text}: {why}" for text in inconclusive))
+            why = "Name the skin (--skin), so that the file's known touches can decide"
+        return CheckOutcome(inconclusive=tuple(f"{text}. {why}" for text in inconclusive))
     size = np.abs(case.predicted)
     weight = 1 / np.maximum(size, WEAK_PER_GREATEST * size.max())
     order = ranked(_fits(case, measured, transfers, weight))
