@@ -34,7 +34,7 @@ are right or wrong, such as a file that is rejected.
 
 *Other programs* are numpy (one Gauss-Newton step), scikit-learn (Lasso) and pyEIT, if they were
 given the same frames. *Worse* means that the image has a lower MIoU, and that nothing was reported;
-*right* means that it loses at most .02. [Peers](peers.md) has the conditions, and what eitskin does.
+*right* means that it loses at most .02. [Peers](peers.md) has the conditions and what eitskin does.
 None of these programs is made to judge frames.
 
 {groups}
