@@ -16,7 +16,7 @@ INTEGER = re.compile(r"-?(0x)?[0-9a-fA-F]+[uUlL]*")
 
 
 def declarations(path: Path, seen: set[Path]) -> str:
-    """What a header and those that it includes declare, each once, as cffi reads it."""
+    """Return the declarations of a header and of those that it includes, each once, for cffi."""
     if path in seen:
         return ""
     seen.add(path)

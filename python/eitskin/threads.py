@@ -70,7 +70,7 @@ class FairLock:
         return self._owner is None and self._waiting[0] is ticket
 
     def release(self) -> None:
-        """Let go of the lock, once for each ``acquire``."""
+        """Release the lock, once for each ``acquire``."""
         with self._changed:
             self._depth -= 1
             if self._depth == 0:
@@ -85,9 +85,9 @@ class FairLock:
 
 
 class OneReader:
-    """Whose turn it is to read ``what``, such as "the frames of /dev/ttyACM0": one reader at a
-    time. A reader in the same thread takes over from the one before; another thread is refused
-    while the thread that reads is alive."""
+    """Lets one reader at a time read ``what``, such as "the frames of /dev/ttyACM0". A reader in
+    the same thread takes over from the one before; another thread is refused while the thread that
+    reads is alive."""
 
     def __init__(self, what: str, advice: str) -> None:
         self._what, self._advice = what, advice
@@ -188,8 +188,8 @@ class OneThreadAtATime(Generator[T, None, None]):
 
 
 def within(limit_s: float, action: Callable[[], T]) -> T | None:
-    """What ``action`` returns; its error is raised here. None if it takes longer than ``limit_s``:
-    then a thread that ends with the process goes on with it."""
+    """Return the result of ``action``, or raise its error. Return None if it takes longer than
+    ``limit_s``; a thread that ends with the process then continues it."""
     done: list[tuple[T | None, BaseException | None]] = []
 
     def run() -> None:

@@ -11,7 +11,7 @@ class DiagnosticFields(Protocol):
 
     @property
     def diagnostics(self) -> int:
-        """Which diagnostics were made, a bit each."""
+        """The diagnostics that were made, one bit each."""
 
     @property
     def saturated(self) -> int:

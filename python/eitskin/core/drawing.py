@@ -44,5 +44,5 @@ class TouchDrawing:
 
 
 def _numbers(touch: Touch) -> dict[str, Any]:
-    """What is not known is 0 in C."""
+    """Return the numbers of a touch for C, where 0 stands for what is not known."""
     return {name: getattr(touch, name) or 0 for name in _NAMES}

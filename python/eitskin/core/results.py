@@ -215,7 +215,7 @@ class Reconstruction:
 
     @property
     def image_is(self) -> str:
-        """What ``image`` is: "touches" or "solver"."""
+        """The kind of ``image``: "touches" or "solver"."""
         return "solver" if self.touch_image is None else "touches"
 
     def __repr__(self) -> str:

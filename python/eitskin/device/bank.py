@@ -18,7 +18,7 @@ RECORD_BYTES = _RECORD.size
 
 
 def record_offset(bank_bytes: int = BANK_BYTES) -> int:
-    """Where the record begins in a bank of ``bank_bytes``; a model may be as long."""
+    """Return the byte at which the record begins in a bank, which is the longest a model can be."""
     return bank_bytes - _RECORD.size
 
 

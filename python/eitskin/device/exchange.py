@@ -103,8 +103,8 @@ class CommandExchange:
         return self.link.counters
 
     def close(self) -> None:
-        """Let go of the port, after a word to the board, whose current stops; may be called twice,
-        and from any thread. Takes no longer than a moment, whatever the port does."""
+        """Tell the board to stop its current, and close the port. May be called twice, and from any
+        thread. Takes no longer than a moment, whatever the port does."""
         if self.link.connected and not self.replays and not self.link.away:
             with suppress(EitskinError):
                 self.bounded(WORD_S, self._say_goodbye)

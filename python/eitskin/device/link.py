@@ -132,7 +132,7 @@ class Link(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Stop and let go of the port, within CLOSE_S whatever the port does."""
+        """Stop, and close the port, within CLOSE_S whatever the port does."""
 
     def _note_closed(self) -> None:
         with self._changed:
@@ -322,7 +322,8 @@ class PumpedLink(Link):
 
 @dataclass(frozen=True)
 class Reconnect:
-    """How long a board that was unplugged is waited for: ``tries`` times, ``every_s`` apart."""
+    """How often the link tries to find a board that was unplugged: ``tries`` times, each
+    ``every_s`` after the one before."""
 
     tries: int = 240
     every_s: float = 0.5

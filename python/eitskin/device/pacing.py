@@ -7,7 +7,7 @@ MAX_BEHIND_S = 0.25  # further behind, what is lost is not caught up
 
 
 class WallClock:
-    """Where a pacer has its time from: this computer's."""
+    """The clock of this computer, from which a pacer has its time."""
 
     def now_s(self) -> float:
         """Seconds from any beginning."""

@@ -88,7 +88,7 @@ class Source:
         return False
 
     def close(self) -> None:
-        """Let go of it; may be called twice."""
+        """Close the source; may be called twice."""
 
 
 class SourceTransport(Transport):
@@ -256,7 +256,7 @@ class SourceTransport(Transport):
             self._rows = model.protocol.n_rows
 
     def _miss(self, now: float) -> None:
-        """Where no frame comes for long, the board's clock goes on, and it reports the silence."""
+        """If no frame comes for long, advance the board's clock, so that it reports the silence."""
         if self.source.synchronous:
             return
         limit = max(SILENT_S, SILENT_PERIODS * self._period_us() / 1e6)

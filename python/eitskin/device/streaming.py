@@ -55,7 +55,7 @@ def packet_stream(device: CommandExchange, what: Stream, every: int, frames: int
 
 
 class _Progress:
-    """Which frames of a stream came, by kind."""
+    """The frames of a stream that have come, by kind."""
 
     def __init__(self, what: Stream, frames: int) -> None:
         self.what, self.wanted = what, frames

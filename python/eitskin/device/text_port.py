@@ -1,4 +1,4 @@
-"""Where lines come from: a serial port, a file, standard input, a FIFO, a TCP connection."""
+"""The sources of lines: a serial port, a file, standard input, a FIFO, a TCP connection."""
 
 import errno
 import os
@@ -39,7 +39,7 @@ class LinePort:
         return False
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the port."""
 
 
 class SerialLines(LinePort):

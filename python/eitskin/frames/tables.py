@@ -50,7 +50,7 @@ class TextTable:
 
     @property
     def found(self) -> str:
-        """What was found in the file, for messages."""
+        """Return what was found in the file, for messages."""
         label = "no label" if self.form.label is None else f"label {self.form.label!r}"
         heads = f"{self.header_rows or 'no'} header row{'s' * (self.header_rows > 1)}"
         return (

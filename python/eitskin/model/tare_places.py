@@ -69,7 +69,7 @@ LEAST_SHARE = 0.05  # r is taken as at least this
 
 @dataclass(frozen=True, eq=False)
 class PlacesByMetric:
-    """What the tare reveals about places: for touches that are found in reduced data
+    """The knowledge about places that the tare reveals: for touches that are found in reduced data
     (``reduced``), and for touches that are found in folded rows by each of m metrics: ``seen``
     (q, k) and ``moves`` (m, 2, t, q) as in :class:`TarePlaces`."""
 

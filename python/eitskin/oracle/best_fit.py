@@ -32,7 +32,7 @@ STEP = 1e-4  # of the parameters, which are mm, ln(mm) and amplitudes, for slope
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of a disc before it is measured: mean and deviation of ln(radius / mm), and of
+    """The knowledge of a disc before it is measured: mean and deviation of ln(radius / mm), and of
     the amplitude 2 (c - 1) / (c + 1) of a disc of contrast c. None: nothing is known."""
 
     log_radius: tuple[float, float] | None = None

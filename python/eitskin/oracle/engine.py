@@ -367,7 +367,7 @@ class OracleEngine:
         return fit, discs
 
     def starts(self, fit: DiscFit, image: FloatArray) -> list[Disc]:
-        """Where a fit begins: at the peaks of ``image`` (n,)."""
+        """Return the discs with which a fit begins, at the peaks of ``image`` (n,)."""
         return fit.peaks(image)
 
     def reduced(self, seen: Explained, d: FloatArray) -> FloatArray:

@@ -9,8 +9,8 @@ from eitskin.model.model import Model
 
 
 def corrected(model: Model, log_gain: FloatArray, place_mm: FloatArray) -> FloatArray:
-    """Where a touch lies (2,), mm, that is found at ``place_mm`` (2,); ``log_gain`` (k,), the
-    logarithm of v_ref over the scaled reference, NaN without one."""
+    """Return the corrected place (2,), mm, of a touch that is found at ``place_mm`` (2,).
+    ``log_gain`` (k,) is the logarithm of v_ref over the scaled reference, NaN without one."""
     assert model.model_errors is not None
     told, grid = model.model_errors.places, model.grid
     if told is None:

@@ -57,5 +57,5 @@ class PageSocket(WebSocketsSansIOProtocol):
 
 
 def connection_classes() -> dict[str, Any]:
-    """What uvicorn's Config takes for these."""
+    """Return the classes of connections as arguments of uvicorn's Config."""
     return {"http": PageConnection, "ws": PageSocket}

@@ -71,7 +71,7 @@ class SessionReader:
         self._thread.start()
 
     def stop(self) -> None:
-        """End, and let go of the board, within a moment whatever the board does."""
+        """End, and close the board, within a moment whatever the board does."""
         self._stopping.set()
         self._again.set()
         session = self._opened

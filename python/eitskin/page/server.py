@@ -135,7 +135,7 @@ class PageServer:
             server_header=False,
             date_header=False,
             access_log=False,
-            timeout_graceful_shutdown=0.2,  # pages are told, and gone
+            timeout_graceful_shutdown=0.2,  # pages get a last message, and are gone
         )
         self._server = self._uvicorn.Server(config)
         self.reader.start()

@@ -85,7 +85,7 @@ class DriveReport:
 
     @property
     def drive(self) -> int:
-        """Which drive it comes after."""
+        """The drive after which it comes."""
         return self.packet.head.drive
 
     @property
@@ -220,8 +220,8 @@ class Frame:
 
     @cached_property
     def peak(self) -> ImagePeak | None:
-        """Where the solver's image is strongest; None where it was not asked for or not solved, or
-        without its model."""
+        """The strongest place of the solver's image; None if the image was not asked for or not
+        solved, or if its model is not known."""
         if self.solver_image is None or self.known is None or self.refused:
             return None
         top = int(np.argmax(np.abs(self.solver_image)))
@@ -324,7 +324,7 @@ class Frame:
         return touches_html(f"frame {self.number}, {self.time_s:.3f} s", self.touches)
 
     def _repr_png_(self) -> bytes | None:
-        """Where the model is known and matplotlib is installed."""
+        """Return a picture, if the model is known and matplotlib is installed."""
         if self.known is None or find_spec("matplotlib") is None:
             return None
         axes = import_module("eitskin.view.touch_axes")  # of a later module, as a result's picture

@@ -33,7 +33,7 @@ _OF_ELECTRODES = {
 
 
 class Novelty:
-    """Which faults, events and diagnostics are new, as they come."""
+    """Picks those faults, events and diagnostics that are new, as they come."""
 
     def __init__(self) -> None:
         # what was reported to be there: frames in a row without it

@@ -146,8 +146,8 @@ class Session:
         self.close(str(error) if error is not None else "")
 
     def close(self, reason: str = "") -> None:
-        """Let go of the board and the recording, and answer what is still asked, with ``reason``;
-        may be called twice."""
+        """Close the board and the recording, and answer all open requests with ``reason``; may be
+        called twice."""
         if not hasattr(self, "device"):
             self._requests.close(reason or f"{self.url}: the session was closed; start again")
             return

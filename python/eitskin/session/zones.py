@@ -159,7 +159,7 @@ def _cross(one: Outline, other: Outline) -> bool:
     b, d = np.roll(a, -1, axis=0), np.roll(c, -1, axis=1)
 
     def side(p: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
-        """How far r lies to the left of the line from p to q, mm."""
+        """Return the distance of r to the left of the line from p to q, mm."""
         along = q - p
         cross = along[..., 0] * (r - p)[..., 1] - along[..., 1] * (r - p)[..., 0]
         far = cross / np.linalg.norm(along, axis=-1)

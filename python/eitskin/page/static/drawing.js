@@ -1,4 +1,4 @@
-// What is drawn: the skin with its image, touches and electrodes, and the raw voltages.
+// The drawings: the skin with its image, touches and electrodes, and the raw voltages.
 
 const AHEAD_S = 0.05;
 const TRAIL_S = 1.5;
@@ -200,7 +200,7 @@ export class SkinDrawing {
     context.restore();
   }
 
-  // Where to press: done ones filled, the next one a ring with its number.
+  // The places to press: done ones are filled, the next one is a ring with its number.
   drawPlaces(context, { places_mm, done, number, step }) {
     places_mm.forEach(([x, y], k) => {
       const now = k === number && step !== "done", there = done.includes(k);

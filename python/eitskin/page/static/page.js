@@ -7,10 +7,10 @@ const $ = (id) => document.getElementById(id);
 const MAGIC = 0x31465645; // "EVF1"
 const WORDS_MS = 2500; // between two texts for screen readers
 const SHOWN_LOG = 60;
-const FINGERS = ["down", "move", "up"]; // told by the touches themselves
-const STEP_MM = 5; // of a finger that the arrow keys move
-const MAX_FINGERS = 5; // that may press at once
-const GESTURE_MS = 4000; // that a gesture stays to be read
+const FINGERS = ["down", "move", "up"]; // the touches themselves show these
+const STEP_MM = 5; // the step of a finger that the arrow keys move
+const MAX_FINGERS = 5; // the most fingers that may press at once
+const GESTURE_MS = 4000; // how long a gesture stays on the page
 
 const skin = new SkinDrawing($("skin"));
 const space = new SurfaceDrawing($("surface"), $("labels"));
