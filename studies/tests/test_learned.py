@@ -7,7 +7,6 @@ from eitskin.errors import FileError, UsageError
 from eitskin.scoring.metrics import pixel_cover
 from eitskin.skin.protocol import adjacent, table
 from eitskin.skin.skin import paper_skin
-from eitskin_studies.compare import learned
 from eitskin_studies.compare.families import setup_for
 from eitskin_studies.compare.learned import Network, learned_family, turned_rows
 
@@ -47,8 +46,7 @@ def write_chunk(folder, setup, count=24):
     return covers
 
 
-def test_a_trained_network_shows_its_touches(setup, tmp_path, monkeypatch):
-    monkeypatch.setattr(learned, "EPOCHS", 30)
+def test_a_trained_network_shows_its_touches(setup, tmp_path):
     covers = write_chunk(tmp_path, setup)
     family = learned_family(setup, tmp_path)
     network = family.make(family.values[0])
