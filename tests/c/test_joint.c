@@ -306,8 +306,8 @@ TEST(products_are_those_of_the_inverse_covariance)
         for (int c = 0; c < 2; ++c) {
             for (int i = 0; i < SMALL_FOLDED; ++i)
                 columns[c][i] *= m->weight[i];
-            eits_joint_add_along(ctx, columns[c], 0, 9, along[c]); /* in blocks */
-            eits_joint_add_along(ctx, columns[c] + 9, 9, SMALL_FOLDED - 9, along[c]);
+            eits_joint_add_along(ctx, columns[c], 1, 0, 9, along[c]); /* in blocks */
+            eits_joint_add_along(ctx, columns[c] + 9, 1, 9, SMALL_FOLDED - 9, along[c]);
             eits_joint_finish_along(ctx, along[c]);
         }
         for (int c = 0; c < 3; ++c) {
@@ -320,6 +320,44 @@ TEST(products_are_those_of_the_inverse_covariance)
             CHECK_NEAR(got, expected[c], 1e-3 * sqrt(expected[0] * expected[2]) + 1e-3);
         }
         CHECK_NEAR(eits_joint_data(ctx), energy / variance, 1e-3 * energy / variance);
+    }
+}
+
+/* Columns are multiplied two at a time; an odd one alone. Each gets the bits that it has alone. */
+TEST(columns_at_once_have_the_products_that_each_has_alone)
+{
+    eits_context *ctx = open_joint(1);
+    stage_shapes(ctx, DISCS, 2, 1);
+    ctx->reference.distance = R(0.18);
+    (void)eits_joint_metric(ctx);
+    CHECK(ctx->joint.errors > 0);
+    static eits_real columns[3][EITS_JOINT_BLOCK];
+    eits_real alone[3][EITS_JOINT_NUISANCES] = {{0}}, at_once[3][EITS_JOINT_NUISANCES] = {{0}};
+    for (int c = 0; c < 3; ++c) {
+        for (int i = 0; i < SMALL_FOLDED; ++i)
+            columns[c][i] = (eits_real)sin(1.0 + i + 7.0 * c);
+        eits_joint_add_along(ctx, columns[c], 1, 0, SMALL_FOLDED, alone[c]);
+    }
+    eits_joint_add_along(ctx, columns[0], 3, 0, SMALL_FOLDED, at_once[0]);
+    CHECK(memcmp(alone, at_once, sizeof alone) == 0);
+}
+
+/* A column of the inverse costs less than two solves with a unit vector, and has their bits. */
+TEST(columns_of_an_inverse_are_those_of_two_solves)
+{
+    enum { N = 9, FIRST = 4 };
+    eits_real lower[EITS_LOWER_SIZE(N)];
+    for (uint32_t i = 0; i < N; ++i) {
+        for (uint32_t k = 0; k <= i; ++k)
+            eits_lower_row(lower, i)[k] = (eits_real)sin(1.0 + 3.0 * i + k) + (i == k ? 4 : 0);
+    }
+    for (uint32_t last = FIRST + 1; last <= N; ++last) {
+        eits_real both[N] = {0}, column[N];
+        both[last - 1] = 1;
+        eits_lower_solve(lower, N, both);
+        eits_lower_solve_transposed(lower, N, both);
+        eits_lower_inverse(lower, N, FIRST, last, column);
+        CHECK(memcmp(both + FIRST, column + FIRST, (last - FIRST) * sizeof both[0]) == 0);
     }
 }
 

@@ -79,11 +79,11 @@ static void add_columns(eits_context *ctx, uint32_t n, uint32_t first, uint32_t 
         eits_real *column = m->column + (size_t)BLOCK * a, *row = eits_lower_row(m->normal, a);
         for (uint32_t i = 0; i < count; ++i)
             column[i] *= weight[i];
-        eits_joint_add_along(ctx, column, first, count, along_of(ctx, a));
         m->gradient[a] += eits_dot(ctx->kernels, column, left, count);
         for (uint32_t b = 0; b <= a; ++b)
             row[b] += eits_dot(ctx->kernels, column, m->column + (size_t)BLOCK * b, count);
     }
+    eits_joint_add_along(ctx, m->column, n, first, count, m->along);
 }
 
 /* What the shapes leave of one block, weighed, and their columns into the normal equations. */
@@ -109,7 +109,7 @@ static uint64_t add_block(eits_context *ctx, const eits_joint *j, int slopes, ui
     for (uint32_t i = 0; i < count; ++i)
         left[i] *= m->weight[first + i];
     s->square += eits_dot(ctx->kernels, left, left, count);
-    eits_joint_add_along(ctx, left, first, count, s->along);
+    eits_joint_add_along(ctx, left, 1, first, count, s->along);
     const uint32_t n = slopes ? j->free_count * j->parameters : 0;
     add_columns(ctx, n, first, count, left);
     return macs + (uint64_t)n * (n + 7u + 2u * m->errors) / 2u * count;
@@ -342,9 +342,8 @@ uint64_t eits_joint_places(eits_context *ctx, const eits_joint *j, eits_joint_kn
     for (uint32_t k = 0; k < j->count; ++k) {
         eits_real block[EITS_LOWER_SIZE(EITS_JOINT_ELLIPSE)];
         for (uint32_t i = 0; i < p; ++i) {
-            eits_real column[MAX_PARAMETERS] = {0};
-            column[k * p + i] = 1;
-            solve(ctx, n, column);
+            eits_real column[MAX_PARAMETERS];
+            eits_lower_inverse(ctx->joint.factor, n, k * p, k * p + i + 1u, column);
             for (uint32_t l = 0; l <= i; ++l)
                 eits_lower_row(block, i)[l] = column[k * p + l];
         }

@@ -42,10 +42,11 @@ uint32_t eits_joint_folds(const eits_context *ctx);
 /* |W d|^2 less its part along the drift. */
 eits_real eits_joint_data(const eits_context *ctx);
 
-/* Add the products of a weighted column, folds first ... first + count - 1, with what no touch
- * causes: 1 + joint.errors numbers. */
-void eits_joint_add_along(const eits_context *ctx, const eits_real *column, uint32_t first,
-                          uint32_t count, eits_real *along);
+/* Add the products of n weighted columns with what no touch causes, to 1 + joint.errors numbers of
+ * each: `columns` has their folds first ... first + count - 1, EITS_JOINT_BLOCK numbers apart, and
+ * `along` the sums, EITS_JOINT_NUISANCES apart. */
+void eits_joint_add_along(const eits_context *ctx, const eits_real *columns, uint32_t n,
+                          uint32_t first, uint32_t count, eits_real *along);
 
 /* L^-1 of these sums: a product of two columns loses the product of their numbers. */
 void eits_joint_finish_along(eits_context *ctx, eits_real *along);

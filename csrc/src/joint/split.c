@@ -123,7 +123,7 @@ static int stand(const eits_context *ctx, const eits_joint *one, const eits_join
 }
 
 /* Shape k as two along the direction that the linearisation finds best, or along one by which the
- * data would fit; 0 where none promises enough. */
+ * data would fit; 0 where none promises enough. The normal equations are those about *best then. */
 static int best_two(eits_context *ctx, const eits_joint *one, uint32_t k, eits_joint *best,
                     uint64_t *spent)
 {
@@ -132,6 +132,7 @@ static int best_two(eits_context *ctx, const eits_joint *one, uint32_t k, eits_j
     const int is_long = eits_pole_eta(&one->shape[k]) > EITS_JOINT_SPLIT_ETA,
               far = eits_weighs_errors(ctx) != 0;
     int found = 0;
+    int current = 0;     /* whether the normal equations are those about *best */
     if (far && !is_long) /* the model's errors look like two fingers side by side, too */
         return 0;
     for (int d = 0; d < (far ? 1 : DIRECTIONS) && !(found && least < fits); ++d) {
@@ -141,12 +142,15 @@ static int best_two(eits_context *ctx, const eits_joint *one, uint32_t k, eits_j
             !eits_pole_on_skin(ctx, two.shape[one->count].x, two.shape[one->count].y))
             continue;
         const eits_real expected = eits_joint_expect(ctx, &two, spent);
-        if (expected < least) {
+        current = expected < least;
+        if (current) {
             *best = two;
             least = expected;
             found = 1;
         }
     }
+    if (found && !current)
+        (void)eits_joint_expect(ctx, best, spent);
     return found;
 }
 
@@ -173,7 +177,6 @@ static int try_two(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *spent
     eits_joint two;
     if (!best_two(ctx, j, k, &two, spent))
         return 0;
-    (void)eits_joint_expect(ctx, &two, spent);
     eits_joint_continue(ctx, &two, R(INFINITY), spent);
     if (!stand(ctx, j, &two, k))
         return 0;

@@ -307,6 +307,17 @@ static inline void fill_row(const drive *d, const eits_real *own, uint32_t elect
     out->slope[3][i] = amplitude;
 }
 
+/* The answer alone; `numbers` is constant where this is called. */
+static inline eits_real value_of(const eits_real *by, const eits_real *own, uint32_t electrodes,
+                                 const uint8_t *row, uint32_t numbers)
+{
+    const eits_real *plus = own + row[2], *minus = own + row[3];
+    eits_real value = 0;
+    for (uint32_t j = 0; j < numbers; ++j, plus += electrodes, minus += electrodes)
+        value = eits_fma(by[j], *plus - *minus, value);
+    return value;
+}
+
 /* The same for any number of orders and slopes. */
 static void fill_any_row(const drive *d, const eits_real *own, uint32_t electrodes,
                          const uint8_t *row, uint32_t orders, uint32_t slopes, uint32_t i,
@@ -383,6 +394,10 @@ uint64_t eits_pole_rows(eits_context *ctx, uint32_t k, const eits_shape *shape,
             fill_row(&d, own, electrodes, row, 1, i, out);
         else if (slopes == 4u && orders == 3u)
             fill_row(&d, own, electrodes, row, 0, i, out);
+        else if (slopes == 0u && orders == 5u)
+            out->value[i] = value_of(d.by[0], own, electrodes, row, 10);
+        else if (slopes == 0u && orders == 3u)
+            out->value[i] = value_of(d.by[0], own, electrodes, row, 6);
         else
             fill_any_row(&d, own, electrodes, row, orders, slopes, i, out);
     }
