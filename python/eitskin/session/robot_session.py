@@ -1,6 +1,6 @@
 """A session with all skins of a robot at once.
 
-    a Session per skin, in a thread of its own -> a short queue each -> RobotSession.messages
+    a Session per skin, in a thread of its own (robot_skin) -> RobotQueue -> RobotSession.messages
 
 The thread of a skin places, numbers and times its messages; the one loop of ``messages`` gives them
 to the consumers. The core of a frame runs outside Python's lock, so that threads use all cores.
@@ -8,253 +8,33 @@ to the consumers. The core of a frame runs outside Python's lock, so that thread
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from eitskin.core.gestures import GestureEvent
 from eitskin.device.client import TARE_FRAMES
 from eitskin.device.link import Reconnect
 from eitskin.device.pacing import Pacer, WallClock
-from eitskin.device.recordings.recording import Recorder
 from eitskin.device.timing import check_speed
-from eitskin.errors import DeviceError, EitskinError, FileError, UsageError
+from eitskin.errors import FileError, UsageError
 from eitskin.kinematics.pose import Pose
 from eitskin.robot.description import Robot, RobotSkin, is_robot, looped, open_robot
-from eitskin.robot.recorded import begin_folder, skin_file, write_recorded
-from eitskin.session.frame import DriveReport, Frame, Message, Notice
+from eitskin.robot.recorded import begin_folder, write_recorded
+from eitskin.session.frame import Message, Notice
 from eitskin.session.observer import Observer
+from eitskin.session.robot_queue import RobotQueue
+from eitskin.session.robot_skin import RobotSkinSession, named
 from eitskin.session.session import Session
 from eitskin.session.settings import Say, SessionSettings
 from eitskin.session.summary import Summary
 from eitskin.threads import OneThreadAtATime
 
 FOR_EVER = Reconnect(tries=2**31, every_s=0.5)
-FIRST_WAIT_S, MAX_WAIT_S = 0.5, 30.0  # before a board that failed is opened again
 ROOM = 4  # messages of a skin that wait
-LOOK_S = 0.25  # how soon a thread that waits for room notices a request to its board
+DRIVES_ROOM = 40  # the same with reports after drives, of which a frame has 16 and more
 ENDING_S = 5.0  # that the threads of all skins may take to end
-MAX_DRIFT = 100e-6  # by which two quartzes differ
 Observe: TypeAlias = Callable[[Session], Observer | None]
-
-
-class HostClock:
-    """A board's times by the clock of the host. A message cannot come before it was made: the
-    smallest delay so far is taken for none, and rises by ``MAX_DRIFT``, so that it follows a board
-    whose clock is slow."""
-
-    def __init__(self) -> None:
-        self._offset_us: float | None = None
-        self._last_us = 0.0
-
-    def offset_us(self, made_us: int, arrived_us: float) -> float:
-        """How much is to be added to the board's times, by a message that was complete at
-        ``made_us`` of its clock and came at ``arrived_us`` of the host's."""
-        now = arrived_us - made_us
-        if self._offset_us is None:
-            self._offset_us = now
-        risen = self._offset_us + MAX_DRIFT * max(arrived_us - self._last_us, 0.0)
-        self._offset_us, self._last_us = min(now, risen), arrived_us
-        return self._offset_us
-
-
-class RobotSkinSession:
-    """A skin of a ``RobotSession``: its session and the thread that reads it.
-
-    Attributes:
-        session: the one under way; another one after its board was lost.
-        summary: what its messages amounted to.
-        waiting: messages for the loop, each with a number by which they came.
-        over: no more will come.
-    """
-
-    def __init__(self, robot: "RobotSession", skin: RobotSkin, index: int) -> None:
-        self.skin, self._robot, self._index = skin, robot, index
-        self._begun = 0  # sessions that have started
-        self._frames = 0
-        self.session = self._new_session()
-        self.summary = Summary()
-        self.waiting: deque[tuple[int, Message]] = deque()
-        self.started = self.over = False
-        self.room = threading.Condition(robot.lock)
-        self.starts_us: int | None = None  # of the stream's, or the recording's, first frame
-        self._clock, self._last_s = HostClock(), 0.0
-        self._thread = threading.Thread(target=self._run, name=f"eitskin {skin.name}", daemon=True)
-
-    def _new_session(self) -> Session:
-        robot, skin, how = self._robot, self.skin, self._robot.settings
-        settings = replace(
-            how,
-            model=how.model if skin.model is None else skin.model,
-            name=skin.name,
-            link=skin.link,
-            pose=skin.pose,
-            frames=max(how.frames - self._frames, 1) if how.frames else 0,
-            record=None
-            if how.record is None
-            else skin_file(how.record, skin.name, self._begun + 1),
-        )
-
-        def named(say: Say) -> Say:
-            return lambda text: say(f"{skin.name}: {text}")
-
-        return Session(
-            skin.device, settings, say=named(robot.say), progress=named(robot.progress),
-            reconnect=robot.reconnect, observe=robot.observe,
-        )  # fmt: skip
-
-    def open(self) -> None:
-        try:
-            self.session.__enter__()
-        except EitskinError as error:
-            raise _named(self.skin.name, error) from None
-
-    def begin(self) -> None:
-        self._thread.start()
-
-    def record(self, folder: Path, failed: Callable[[FileError], object]) -> None:
-        """Record into ``folder`` from the next frame on; to be called in the session's ``ask``."""
-        session, file = self.session, skin_file(folder, self.skin.name)
-        session.recorder = Recorder(
-            file, session.device, session.solver, name=self.skin.name, failed=failed
-        )
-        self.starts_us = None
-
-    def end_recording(self) -> None:
-        """Likewise in ``ask``."""
-        recorder, self.session.recorder = self.session.recorder, None
-        if recorder is not None:
-            recorder.close()
-
-    def join(self, timeout_s: float) -> None:
-        if self._thread.ident is not None:
-            self._thread.join(max(timeout_s, 0.0))
-
-    # ---- the thread ----
-
-    def _run(self) -> None:
-        robot = self._robot
-        try:
-            self._start(self.session)
-            robot.note(self, started=True)
-            robot.begun.wait()
-            while not robot.stopping.is_set():
-                try:
-                    self._read()
-                    return
-                except DeviceError as error:
-                    if self.session.timed:
-                        raise
-                    self._come_back(error)
-        except BaseException as error:
-            robot.note(self, error=_named(self.skin.name, error))
-        finally:
-            robot.note(self, over=True)
-
-    def _start(self, session: Session) -> None:
-        self.session = session
-        if self._robot.stopping.is_set():  # between two sessions
-            session.stop()
-        session.start()
-        self._begun += 1
-
-    def _read(self) -> None:
-        messages = self.session.messages()
-        try:
-            for message in messages:
-                self._frames += isinstance(message, Frame)
-                if not self._put(self._shared(message)):
-                    return
-        finally:
-            messages.close()
-
-    def _come_back(self, error: DeviceError) -> None:
-        """Open a board that failed again and again, less and less often, until it answers or the
-        robot's session ends."""
-        robot, wait_s, said = self._robot, FIRST_WAIT_S, ""
-        while True:
-            if str(error) != said:
-                said = str(error)
-                self._notice(f"link: lost: {said}; opening it again until it answers")
-            self.session.close(said)
-            if robot.stopping.wait(wait_s):
-                return
-            wait_s = min(2 * wait_s, MAX_WAIT_S)
-            session = self._new_session()
-            try:
-                session.__enter__()
-                self._start(session)
-            except DeviceError as other:
-                error = other
-                continue
-            self._clock = HostClock()
-            recorded = session.settings.record
-            more = "" if recorded is None else f"; its recording goes on in {recorded.name}"
-            self._notice(f"link: back: {session.name}{more}")
-            return
-
-    def _notice(self, text: str) -> None:
-        self._put(Notice("link", text, self._last_s, time.time(), source=self.skin.name))
-
-    def _put(self, message: Message) -> bool:
-        """Give ``message`` to the loop, when there is room, or a request waits for the board; False
-        once the robot's session ends."""
-        robot = self._robot
-        with robot.lock:
-            while len(self.waiting) >= ROOM and not self.session.asked:
-                if robot.stopping.is_set():
-                    return False
-                self.room.wait(LOOK_S)
-            robot.count += 1
-            self.waiting.append((robot.count, message))
-            robot.arrived.notify()
-        return not robot.stopping.is_set()
-
-    def _shared(self, message: Message) -> Message:
-        """``message`` by the robot's clock, with ids that no other skin has."""
-        if isinstance(message, Notice):
-            return replace(message, time_s=self._last_s)
-        time_us = self._time_us(message)
-        self._last_s = time_us / 1e6
-        number, count = self._index, len(self._robot.robot.skins)
-
-        def unique(one: int) -> int:
-            return one and (one - 1) * count + number + 1
-
-        if isinstance(message, DriveReport):
-            touches = tuple(replace(one, id=unique(one.id)) for one in message.touches)
-            packet = replace(message.packet, touches=touches)
-            return replace(message, time_us=time_us, packet=packet)
-        if self.starts_us is None:
-            self.starts_us = time_us
-
-        def renumbered(events: tuple[GestureEvent, ...]) -> tuple[GestureEvent, ...]:
-            return tuple(
-                replace(one, first_id=unique(one.first_id), second_id=unique(one.second_id))
-                for one in events
-            )
-
-        board_events = message.board_events
-        return replace(
-            message,
-            time_us=time_us,
-            touches=tuple(replace(one, id=unique(one.id)) for one in message.touches),
-            events=renumbered(message.events),
-            board_events=None if board_events is None else renumbered(board_events),
-        )
-
-    def _time_us(self, message: Frame | DriveReport) -> int:
-        """When it was, by the robot's clock: simulated scenes begin together, a recording when it
-        began; a real board's times come from when its messages come."""
-        if self.session.timed:
-            return message.time_us + round(1e6 * self.skin.starts_s)
-        arrived_us = (time.monotonic_ns() - self._robot.began_ns) / 1e3
-        scan_us = self.session.device.board.frame_us if isinstance(message, Frame) else 0
-        offset_us = self._clock.offset_us(message.time_us + scan_us, arrived_us)
-        return max(round(message.time_us + offset_us), 0)
 
 
 class RobotSummary:
@@ -319,19 +99,27 @@ class RobotSession:
             raise UsageError(
                 f"name {self.settings.name!r}: the robot's file names its skins; leave the name out"
             )
-        self.say, self.progress, self.observe = say, progress, observe
-        self.reconnect = reconnect or FOR_EVER
+        self._say, self._progress, self._observe = say, progress, observe
+        self._reconnect = reconnect or FOR_EVER
         self.pacer = Pacer(check_speed(speed, "speed"), clock)
         self.consumers: list[Callable[[Message], None]] = []
-        self.lock = threading.Lock()
-        self.arrived = threading.Condition(self.lock)
-        self.count = 0  # messages that came
-        self.stopping, self.begun = threading.Event(), threading.Event()
-        self.began_ns = 0  # of the clock that all skins share
         self._starting, self._threads = threading.RLock(), False
-        self._error: BaseException | None = None
         self.folder = self.settings.record
-        self._skins = [RobotSkinSession(self, one, k) for k, one in enumerate(robot.skins)]
+        room = ROOM if self.settings.report == "frame" else DRIVES_ROOM
+        self._queue = RobotQueue(len(robot.skins), room)
+        self._skins = [
+            RobotSkinSession(one, self._queue, k, self.settings, self._opened)
+            for k, one in enumerate(robot.skins)
+        ]
+
+    def _opened(self, skin: RobotSkin, settings: SessionSettings) -> Session:
+        def prefixed(say: Say) -> Say:
+            return lambda text: say(f"{skin.name}: {text}")
+
+        return Session(
+            skin.device, settings, say=prefixed(self._say), progress=prefixed(self._progress),
+            reconnect=self._reconnect, observe=self._observe,
+        )  # fmt: skip
 
     def __enter__(self) -> "RobotSession":
         try:
@@ -423,28 +211,17 @@ class RobotSession:
                 begin_folder(self.robot, self.settings.record)
             for skin in self._skins:
                 skin.begin()
-            with self.lock:
-                while not (
-                    self._error is not None
-                    or self.stopping.is_set()
-                    or all(one.started for one in self._skins)
-                ):
-                    self.arrived.wait(LOOK_S)
-        if self._error is not None:
+            self._queue.wait_started()
+        if self._queue.error is not None:
             self.stop()
-            raise self._error
+            raise self._queue.error
 
     def stop(self) -> None:
         """End after the message that comes next; from any thread."""
-        self.stopping.set()
-        self.begun.set()
+        self._queue.end()
         for skin in self._skins:
             skin.session.stop()
         self.pacer.wake()
-        with self.lock:
-            self.arrived.notify_all()
-            for skin in self._skins:
-                skin.room.notify_all()
 
     def tare(self, frames: int = TARE_FRAMES, *, anyway: bool = False) -> "Future[None]":
         """Take the reference of every skin again; the first error is the answer's."""
@@ -471,7 +248,7 @@ class RobotSession:
             try:
                 self._write_recorded()
             except FileError as error:
-                self.say(str(error))
+                self._say(str(error))
 
         done.add_done_callback(write)
         return done
@@ -492,65 +269,21 @@ class RobotSession:
     def _messages(self) -> Generator[Message, None, None]:
         try:
             self.start()
-            self.began_ns = time.monotonic_ns()
-            self.begun.set()
-            while (taken := self._next()) is not None:
-                skin, message = taken
-                if skin.session.timed and not isinstance(message, Notice):
+            self._queue.begin()
+            while (taken := self._queue.next()) is not None:
+                number, message = taken
+                if self._queue.lanes[number].timed and not isinstance(message, Notice):
                     self.pacer.hold(message.time_us)
-                skin.summary.add(message)
+                self._skins[number].summary.add(message)
                 for consumer in self.consumers:
                     consumer(message)
                 yield message
-                if self.stopping.is_set():
+                if self._queue.ending.is_set():
                     return
         finally:
             self.stop()
             self._join()
             self._write_recorded()
-
-    def _next(self) -> tuple[RobotSkinSession, Message] | None:
-        """The next message; None when all skins are over. A real board's goes first; what is
-        simulated or recorded comes in the order of its times, once the next one of each is
-        there."""
-        with self.lock:
-            while not self.stopping.is_set():
-                if self._error is not None:
-                    raise self._error
-                skin = self._first()
-                if skin is not None:
-                    message = skin.waiting.popleft()[1]
-                    skin.room.notify()
-                    return skin, message
-                if all(one.over for one in self._skins):
-                    return None
-                self.arrived.wait(LOOK_S)
-        return None
-
-    def _first(self) -> RobotSkinSession | None:
-        there = [one for one in self._skins if one.waiting]
-        now = [one for one in there if _at_once(one)]
-        if now:
-            return min(now, key=lambda one: one.waiting[0][0])
-        if any(one.session.timed and not one.over and not one.waiting for one in self._skins):
-            return None
-        return min(there, key=_time_us, default=None)
-
-    def note(
-        self,
-        skin: RobotSkinSession,
-        *,
-        started: bool = False,
-        over: bool = False,
-        error: BaseException | None = None,
-    ) -> None:
-        """Take note that a skin's thread has started, is over or has failed."""
-        with self.lock:
-            skin.started = skin.started or started
-            skin.over = skin.over or over
-            if not self.stopping.is_set():
-                self._error = self._error or error
-            self.arrived.notify_all()
 
     def _join(self) -> None:
         end_s = time.monotonic() + ENDING_S
@@ -559,18 +292,9 @@ class RobotSession:
 
     def _write_recorded(self) -> None:
         folder, self.folder = self.folder, None
-        if folder is not None and self._error is None and folder.is_dir():
+        if folder is not None and self._queue.error is None and folder.is_dir():
             starts_s = {one.skin.name: (one.starts_us or 0) / 1e6 for one in self._skins}
             write_recorded(self.robot, folder, starts_s)
-
-
-def _at_once(one: RobotSkinSession) -> bool:
-    return not one.session.timed or isinstance(one.waiting[0][1], Notice)
-
-
-def _time_us(one: RobotSkinSession) -> int:
-    message = one.waiting[0][1]
-    return 0 if isinstance(message, Notice) else message.time_us
 
 
 def all_of(answers: dict[str, "Future[Any]"]) -> "Future[Any]":
@@ -588,18 +312,13 @@ def all_of(answers: dict[str, "Future[Any]"]) -> "Future[Any]":
         for name, one in answers.items():
             error = one.exception()
             if error is not None:
-                answer.set_exception(_named(name, error))
+                answer.set_exception(named(name, error))
                 return
         answer.set_result(next(iter(answers.values())).result())
 
     for one in answers.values():
         one.add_done_callback(done)
     return answer
-
-
-def _named(name: str, error: BaseException) -> BaseException:
-    """``error`` with the skin's name, if it is one that a user can cause."""
-    return type(error)(f"skin {name!r}: {error}") if isinstance(error, EitskinError) else error
 
 
 AnySession = Session | RobotSession

@@ -19,7 +19,8 @@ from eitskin.errors import DeviceError, FileError, SkinTouchedError, UsageError
 from eitskin.robot.description import load_robot
 from eitskin.session.frame import DriveReport, Frame, Notice
 from eitskin.session.message import schema
-from eitskin.session.robot_session import ROOM, HostClock, RobotSession, open_session
+from eitskin.session.robot_session import ROOM, RobotSession, open_session
+from eitskin.session.robot_skin import HostClock
 from eitskin.session.settings import SessionSettings
 
 VALID = jsonschema.Draft202012Validator(schema())
@@ -247,7 +248,7 @@ def test_skins_wait_for_a_slow_reader(tmp_path):
         messages = session.messages()
         for _, message in zip(range(5 * 8), messages, strict=False):
             time.sleep(0.002)
-            assert max(len(one.waiting) for one in session._skins) <= ROOM
+            assert max(map(len, session._queue.lanes)) <= ROOM
             if isinstance(message, Frame):
                 numbers.setdefault(message.source, []).append(message.number)
         messages.close()

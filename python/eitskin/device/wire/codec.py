@@ -130,7 +130,7 @@ class Decoder:
         revived = list(self._late)[-self._sequence.revived :] if self._sequence.revived else []
         self._late.clear()
         self.counters.packets += 1 + len(revived)
-        return [*revived, replace(packet, lost=lost)]
+        return [*revived, replace(packet, lost=lost) if lost else packet]
 
     def _counted(self) -> tuple[int, ...]:
         s = self._state

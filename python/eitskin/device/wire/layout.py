@@ -14,9 +14,16 @@ class PayloadLayout:
     def __init__(self, name: str, fields: list[tuple[str, str, str]]) -> None:
         self.name, self.fields = name, fields
         self.struct = struct.Struct("<" + "".join(letters for _, letters, _ in self.fields))
-        places = [struct.Struct("<" + letters) for _, letters, _ in self.fields]
-        # how many values each field has, a text being one
-        self.counts = [len(place.unpack(bytes(place.size))) for place in places]
+        # of each field: name, form, and where its values begin and end among all, a text being one
+        self.places: list[tuple[str, str, int, int]] = []
+        start = 0
+        for name, letters, form in self.fields:
+            one = struct.Struct("<" + letters)
+            end = start + len(one.unpack(bytes(one.size)))
+            self.places.append((name, form, start, end))
+            start = end
+        values = self.struct.unpack(bytes(self.struct.size))
+        self.reals = [place for place, value in enumerate(values) if isinstance(value, float)]
 
     @property
     def size(self) -> int:

@@ -109,12 +109,16 @@ def unpack(kind: type[AnyPayload], payload: bytes, what: str, *, more: bool = Fa
     layout = kind.LAYOUT
     if len(payload) < layout.size or (len(payload) > layout.size and not more):
         raise MalformedPacket(f"{what}: {len(payload)} bytes, not {layout.size}")
-    values, start, found = layout.struct.unpack_from(payload), 0, {}
-    for (name, _, form), count in zip(layout.fields, layout.counts, strict=True):
-        found[name] = FORMS[form].read(values[start : start + count])
-        start += count
-    if any(isinstance(one, float) and not isfinite(one) for one in values):
+    return _made(kind, layout.struct.unpack_from(payload), what)
+
+
+def _made(kind: type[AnyPayload], values: Sequence[Any], what: str) -> AnyPayload:
+    """The payload whose values on the wire are ``values``."""
+    layout, found = kind.LAYOUT, {}
+    if not all(map(isfinite, [values[place] for place in layout.reals])):
         raise MalformedPacket(f"{what}: a value that is no number")
+    for name, form, start, end in layout.places:
+        found[name] = FORMS[form].read(values[start:end]) if form else values[start]
     return kind(**found)
 
 
@@ -193,9 +197,8 @@ def parse_drive_touches(payload: bytes) -> DriveTouches:
         rest = _grown(rest, OLDEST_DRIVE_TOUCH_BYTES, each.size)
     else:
         _check_rest(payload, head, each.size * head.count, "DRIVE_TOUCHES")
-    parts = (rest[k : k + each.size] for k in range(0, len(rest), each.size))
-    found = tuple(unpack(DriveTouch, part, "DRIVE_TOUCHES") for part in parts)
-    return DriveTouches(head, found)
+    values = each.struct.iter_unpack(rest)
+    return DriveTouches(head, tuple(_made(DriveTouch, one, "DRIVE_TOUCHES") for one in values))
 
 
 def parse_events(payload: bytes) -> FrameEvents:
