@@ -19,6 +19,7 @@ from eitskin_studies.harness.sections import fill_readme
 
 RESULTS = "studies/results"
 DATA = {"tank": "TANKS", "teaching": "PRESSES"}  # studies on measured frames, and who names them
+SHARES = {"other-worlds": "0.5", "patterns": "0.3"}  # of the usual scenes, as the pages have them
 OTHERS = {
     "tradeoff": "tradeoff run -o out/tradeoff --page {page}"
     " --recorded studies/eitskin_studies/tradeoff/front.json"
@@ -48,6 +49,8 @@ def commands() -> dict[str, list[str]]:
         words, page = f"study {name} -o out/{name}".split(), f"{RESULTS}/{name}.md"
         if (checkout_root() / page).is_file():
             words += ["--page", page]
+        if name in SHARES:
+            words += ["--share", SHARES[name]]
         if name in DATA:
             if not (folder := os.environ.get(DATA[name])):
                 continue

@@ -43,6 +43,7 @@ def draw_shares(path: Path, scores: Sequence[Mapping[str, Any]]) -> None:
         left.invert_yaxis()
         left.set(xlabel="scenes counted exactly, %", xlim=(0, 102), title="exact counts")
         right.set(xlabel="false touches per scene", title="false touches")
+        right.locator_params(axis="x", nbins=6)
         right.set_xlim(left=-0.01 * max(one["false_per_scene"] for one in rows) - 0.001)
         for axes in (left, right):
             plain_axes(axes)
@@ -86,4 +87,4 @@ def draw_examples(path: Path, data: Mapping[str, Any]) -> None:
             (Line2D([], [], color=BLUE), "found touch"),
         ]
         legend_below(figure, marks, 2)
-        figure.suptitle("A scene of each set that is counted wrong", fontsize=10)
+        figure.suptitle("The first scene of each set that is counted wrong", fontsize=10)

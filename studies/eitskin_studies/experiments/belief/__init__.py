@@ -9,13 +9,19 @@ from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scoring.matching import match
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.experiments.belief.tables import (
+    HIGH,
+    LOW,
+    Sets,
     conditions,
     counts_table,
+    coverage,
+    curve,
     curve_table,
     places_table,
     summary,
 )
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
+from eitskin_studies.experiments.multitouch.counts import Share
 from eitskin_studies.harness.drawings import Drawing
 from eitskin_studies.pictures.belief_picture import draw_belief
 from eitskin_studies.worlds.score import CoreFinder
@@ -50,9 +56,23 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     return ExperimentOutcome(
         tables=(curve_table(sets), places_table(sets), counts_table(sets)),
         data={"sets": sets, "seed": seed, "scenes": count},
-        pictures={"belief.svg": Drawing(draw_belief, sets)},
+        pictures={"belief.svg": Drawing(draw_belief, _drawn(sets))},
         words={"conditions": conditions(settings, count), "summary": summary(sets)},
     )
+
+
+def _drawn(sets: Sets) -> dict[str, Any]:
+    """What the picture shows: the curve, and the coverage of sets with touches that were found."""
+    shares = {name: coverage(frames) for name, frames in sets.items()}
+    return {
+        "curve": [[part.said, _numbers(part.true)] for part in curve(sets)],
+        "covered": {name: _numbers(one) for name, one in shares.items() if one.count},
+        "band": [LOW, HIGH],
+    }
+
+
+def _numbers(of: Share) -> list[float]:
+    return [of.mean, of.low, of.high]
 
 
 def frames_of(finder: CoreFinder, of: WorldScenes) -> list[dict[str, Any]]:

@@ -39,7 +39,7 @@ USUAL = 200
 BARE = {"row_gains": False, "touch_test": False}
 SHOWN = (
     "drift_2_percent_light",
-    "uneven_20_percent",
+    "five_at_2_5_radii",
     "misplaced_3_mm",
     "ellipses",
     "two_fingers_12_to_16_mm",
