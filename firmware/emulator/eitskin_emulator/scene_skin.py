@@ -3,7 +3,6 @@
 import numpy as np
 
 from eitskin.arrays import FloatArray
-from eitskin.errors import ProtocolError
 from eitskin.scene.board_frames import BoardFrames, SceneRows
 from eitskin.scene.description import Scene
 from eitskin.skin.protocol import Protocol
@@ -43,16 +42,9 @@ def skin_of(scene: Scene, protocol: Protocol) -> AnalogSkin:
     emulated converter.
 
     Raises:
-        ProtocolError: the scene's skin has another number of electrodes than the model.
-        ConfigError, MissingExtraError: the scene cannot be simulated.
+        ProtocolError, ConfigError: as ``BoardFrames.rows``.
+        MissingExtraError: the scene cannot be simulated.
     """
-    electrodes = scene.skin.electrodes.count
-    if electrodes != protocol.n_electrodes:
-        raise ProtocolError(
-            f"{scene.where}: its skin has {electrodes} electrodes, the model is for"
-            f" {protocol.n_electrodes}; build a model of the scene's skin with  eitskin model build"
-            "  and give it with  --model"
-        )
     rows = BoardFrames(scene, DONE_BY_THE_BOARD).rows(protocol)
     untouched_v = rows.part(range(min(scene.quiet_frames, MAX_UNTOUCHED)))
     recorded = RecordedRows(rows)

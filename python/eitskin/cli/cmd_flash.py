@@ -2,14 +2,20 @@
 
 import argparse
 import json
-import shutil
 import sys
 import tempfile
 from hashlib import sha256
 from pathlib import Path
 
 from eitskin.cli.arguments import option
-from eitskin.device.flash import TOOLS, check_image, export_flash, plan_flash, run_flash
+from eitskin.device.flash import (
+    TOOLS,
+    FlashPlan,
+    check_image,
+    export_flash,
+    plan_flash,
+    run_flash,
+)
 from eitskin.errors import UsageError
 from eitskin.fileio import read_bytes, write_bytes
 from eitskin.firmware.prebuilt import BOARD, load_image
@@ -35,7 +41,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " needs no tool and no board",
         Path,
     )
-    option(parser, "--dry-run", "print the commands and do nothing")
+    option(
+        parser,
+        "--dry-run",
+        "print the commands; the files that they name exist only while flash runs, and --export"
+        " writes one to flash by hand",
+    )
     option(parser, "--json", "print for programs; only with --dry-run")
     parser.set_defaults(run=run)
 
@@ -50,26 +61,27 @@ def run(options: argparse.Namespace) -> int:
         model = (load_prebuilt() if options.model is None else load_model(options.model))[1]
     if options.export is not None:
         return _export(options, model)
-    folder = Path(tempfile.mkdtemp(prefix="eitskin-flash-"))
-    try:
-        image = options.image if options.image is not None else _prebuilt_image(folder)
-        tool, serial, dry = options.tool, options.serial, options.dry_run
-        plan = plan_flash(image, model, folder, tool=tool, serial=serial, installed=not dry)
-        for name, content in (("image", Path(image).read_bytes()), ("model", model)):
-            if content is not None:
-                print(f"{name} SHA-256 {sha256(content).hexdigest()}", file=sys.stderr)
+    with tempfile.TemporaryDirectory(prefix="eitskin-flash-") as folder:
+        plan = _plan(options, model, Path(folder))
         if not options.dry_run:
             run_flash(plan, lambda line: print(line, file=sys.stderr, flush=True))
-    except BaseException:
-        shutil.rmtree(folder)
-        raise
-    if options.dry_run:  # the files must stay, because the commands name them
-        facts = {"tool": plan.tool, "commands": [list(command) for command in plan.commands]}
-        print(json.dumps(facts, indent=2) if options.json else "\n".join(plan.lines()))
-        return 0
-    shutil.rmtree(folder)
-    print("done; ask the board with  eitskin info")
+            print("done; ask the board with  eitskin info")
+            return 0
+    facts = {"tool": plan.tool, "commands": [list(command) for command in plan.commands]}
+    print(json.dumps(facts, indent=2) if options.json else "\n".join(plan.lines()))
     return 0
+
+
+def _plan(options: argparse.Namespace, model: bytes | None, folder: Path) -> FlashPlan:
+    """Return the commands, whose files are in ``folder``, and print what they would put on the
+    board."""
+    image = options.image if options.image is not None else _prebuilt_image(folder)
+    tool, serial, installed = options.tool, options.serial, not options.dry_run
+    plan = plan_flash(image, model, folder, tool=tool, serial=serial, installed=installed)
+    for name, content in (("image", Path(image).read_bytes()), ("model", model)):
+        if content is not None:
+            print(f"{name} SHA-256 {sha256(content).hexdigest()}", file=sys.stderr)
+    return plan
 
 
 def _export(options: argparse.Namespace, model: bytes | None) -> int:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from eitskin.arrays import FloatArray
+from eitskin.errors import ProtocolError
 from eitskin.scene.description import Scene
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.skin.protocol import Protocol, in_order, table
@@ -33,8 +34,10 @@ class BoardFrames:
         stay unused.
 
         Raises:
-            ConfigError, ProtocolError: as ``prepare_scene`` and ``table``.
+            ProtocolError: it is for another number of electrodes than the scene's skin has.
+            ConfigError: as ``prepare_scene``.
         """
+        self._check_electrodes(protocol)
         key, own = (protocol.hash, protocol.drive_order), self.scene.protocol
         if key not in self._rows:
             scene = self.scene
@@ -44,6 +47,18 @@ class BoardFrames:
                 scene = replace(scene, protocol=in_order(made, protocol.drive_order))
             self._rows[key] = SceneRows(scene)
         return self._rows[key]
+
+    def _check_electrodes(self, protocol: Protocol) -> None:
+        scene = self.scene
+        if protocol.n_electrodes == scene.skin.electrodes.count:
+            return
+        file = scene.skin_file
+        skin, model = ("SKIN.toml", "SKIN.eitm") if file is None else (file, f"{file.stem}.eitm")
+        raise ProtocolError(
+            f"{scene.where}: its skin has {scene.skin.electrodes.count} electrodes, but the board's"
+            f" model is for {protocol.n_electrodes}; build the skin's with  eitskin model build"
+            f" {skin} -o {model}  and name it with  --model {model}"
+        )
 
     def voltage_v(self, protocol: Protocol) -> FloatArray:
         """Return all frames (n, m) in V: the untouched frames of the scene, then the others. Errors

@@ -56,6 +56,7 @@ class Scene:
     Attributes:
         name, description: a word and a line.
         skin, protocol: what is touched and how it is scanned.
+        skin_file: the description that the skin was read from; None: of another origin.
         seed: the seed of everything random.
         frames: the number of recorded frames, the first at 0 s; ``rate_hz`` per second.
         quiet_frames: the number of untouched reference frames before them, at negative times.
@@ -91,6 +92,7 @@ class Scene:
     row_us: float | None = None
     description: str = ""
     where: str = "scene"
+    skin_file: Path | None = None
     dataset: Mapping[str, Any] = field(default_factory=dict)
     text: str = ""
 
@@ -177,7 +179,8 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
     check_keys(head, SCENE_KEYS, place)
     scan = subtable(table, "scan", where)
     check_keys(scan, SCAN_KEYS, f"{where} [scan]")
-    skin, protocol = _skin(head, place, folder)
+    skin_file = _skin_file(head, place, folder)
+    skin, protocol = (paper_skin(), adjacent(16)) if skin_file is None else load_skin(skin_file)
     given = {
         "frames": integer(head, "frames", 1, place, low=1, high=MAX_FRAMES),
         "quiet_frames": integer(head, "quiet_frames", 16, place, low=1, high=MAX_FRAMES),
@@ -210,22 +213,24 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
         frozen=flag(scan, "frozen", False, f"{where} [scan]"),
         row_us=row_us,
         where=where,
+        skin_file=skin_file,
         dataset=subtable(table, "dataset", where),
         text=text,
         **given,
     )
 
 
-def _skin(head: Mapping[str, Any], where: str, folder: Path) -> tuple[Skin, Protocol]:
+def _skin_file(head: Mapping[str, Any], where: str, folder: Path) -> Path | None:
+    """Return the path of the skin's description; None for the paper's skin."""
     name = word(head, "skin", "paper", where)
     if name == "paper":
-        return paper_skin(), adjacent(16)
+        return None
     path = folder / name
     if "\0" in name or not path.is_file():
         raise ConfigError(
             f'{where}: skin = {name!r} is neither "paper" nor a file beside the scene'
         )
-    return load_skin(path)
+    return path
 
 
 def _track(table: Mapping[str, Any], where: str) -> TouchTrack:

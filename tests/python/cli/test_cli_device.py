@@ -273,7 +273,10 @@ def test_flash_prints_what_it_runs_and_runs_it(tmp_path, monkeypatch, ran):
     log, image = fake_tool(tmp_path, "st-flash"), image_file(tmp_path / "firmware.bin")
     monkeypatch.setenv("PATH", str(tmp_path) + os.pathsep + "/bin")
     flash = ["flash", "--image", str(image), "--tool", "st-flash"]
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "files"))
+    (tmp_path / "files").mkdir()
     planned = ran(0, *flash, "--dry-run")[0].splitlines()
+    assert not list((tmp_path / "files").iterdir())
     assert not log.exists() and str(image) in planned[0] and "0x08000000" in planned[0]
     assert "0x08040000" in planned[1]
     out, err = ran(0, *flash)

@@ -15,9 +15,10 @@ from eitskin.device.simulated import FINGER_MM
 from eitskin.device.wire import link_table as cmd
 from eitskin.device.wire.link_table import FaultCode, Quality, ReplyStatus, Stream
 from eitskin.device.wire.packets import Fault, RawFrame, SolvedImage, SolvedTouches
-from eitskin.errors import DeviceError, UsageError
+from eitskin.errors import DeviceError, ProtocolError, UsageError
 from eitskin.model.options import default_options
 from eitskin.scene.board_frames import BoardFrames, SceneRows
+from eitskin.scene.description import load_scene
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.touch_path import Keyframe, TouchTrack
 from eitskin.solve.reconstructor import Reconstructor
@@ -274,3 +275,14 @@ def test_the_self_test_runs_the_golden_frame():
         device.self_test()
         device.clear_faults()
         assert device.info().tared == 1
+
+
+def test_a_scene_of_another_skin_names_the_model_that_is_missing(tmp_path):
+    (tmp_path / "eight.toml").write_text("[skin]\ndiameter_mm = 100\n[electrodes]\ncount = 8\n")
+    (tmp_path / "scene.toml").write_text('[scene]\nskin = "eight.toml"\nelements = 800\n')
+    build = f"eitskin model build {tmp_path}/eight.toml -o eight.eitm"
+    with pytest.raises(
+        ProtocolError, match="8 electrodes, but the board's model is for 16"
+    ) as caught:
+        BoardFrames(load_scene(tmp_path / "scene.toml")).rows(prebuilt()[0].protocol)
+    assert build in str(caught.value) and "\n" not in str(caught.value)

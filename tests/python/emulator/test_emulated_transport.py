@@ -76,7 +76,7 @@ def test_refusals(built, tmp_path):
     elf = built.with_suffix(".elf")
     with pytest.raises(DeviceError, match=r"this is an \.elf; give the \.bin"):
         open_emulated("two_touch", image=elf)
-    with pytest.raises(ProtocolError, match="its skin has 16 electrodes, the model is for 8"):
+    with pytest.raises(ProtocolError, match="has 16 electrodes, but the board's model is for 8"):
         open_emulated("two_touch", image=built, model=small_blob(electrodes=8, rank=12))
 
 

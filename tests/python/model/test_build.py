@@ -2,6 +2,7 @@
 bits."""
 
 from dataclasses import replace
+from importlib.metadata import version
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import DATA_KINDS, STORAGES, prebuilt, small, small_blob, small_model
 
+NETGEN = "6.2.2608"  # made the mesh of the prebuilt model; renew both together
 KINDS = (
     ("disk", "adjacent", 16, 208, 104),
     ("disk", "skip", 16, 208, 104),
@@ -129,8 +131,9 @@ def images_of(model: Model) -> np.ndarray:
 
 
 def test_the_prebuilt_model_is_what_the_builder_makes():
-    """Meshes of other netgen versions differ a little, so images are compared loosely; on one mesh,
-    all numbers closely."""
+    """Meshes of other versions of netgen differ a little, also where they have equally many
+    elements, so images are compared loosely; with the version that made the prebuilt model, all
+    numbers closely."""
     built = build_model(paper_skin(), adjacent(16), BuildSettings(samples=4))
     old, new = prebuilt()[0], decode_model(encode_model(built), "new")
     assert new.protocol.hash == old.protocol.hash
@@ -140,7 +143,11 @@ def test_the_prebuilt_model_is_what_the_builder_makes():
     assert new.column_weight == pytest.approx(old.column_weight, rel=0.02)
     for a, b in zip(images_of(old), images_of(new), strict=True):
         assert np.corrcoef(a, b)[0, 1] > 0.999
-    if new.meta["mesh_elements"] == old.meta["mesh_elements"]:
+    netgen = version("netgen-mesher")
+    if netgen != NETGEN:
+        print(f"netgen {netgen} makes another mesh than {NETGEN}: numbers are compared loosely")
+    else:
+        assert new.meta["mesh_elements"] == old.meta["mesh_elements"]
         for name in ("v_ref_v", "column_weight"):
             assert getattr(new, name) == pytest.approx(getattr(old, name), rel=1e-6)
         # the sign of a singular direction is free

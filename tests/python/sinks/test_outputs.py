@@ -3,6 +3,7 @@
 import socket
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -97,16 +98,28 @@ def test_a_sink_that_raises_systemexit_has_failed_and_goes_on(swipe, made):
     assert (good["sent"], good["failed"]) == (5, 0)
 
 
+def await_taken(outputs: Outputs, count: int) -> None:
+    """Return when each sink but the last, which is stuck, has done something with ``count``
+    items."""
+    end_s = time.monotonic() + 30
+    while any(one["sent"] + one["dropped"] + one["failed"] < count for one in outputs.counts[:-1]):
+        assert time.monotonic() < end_s, outputs.counts
+        time.sleep(0.001)
+
+
 @pytest.mark.parametrize("patient", [False, True])
 def test_a_stuck_and_a_dying_sink_disturb_no_other(swipe, made, patient, monkeypatch):
+    """Each frame comes when the others have taken the one before, so that a busy computer drops
+    nothing; at the end the stuck one is waited for last."""
     monkeypatch.setattr(module, "PATIENCE_S", 0.05)
+    monkeypatch.setattr(module, "ENDING_S", 1.0)
     said: list[str] = []
-    urls = ["stuck:", "good:", "dying:", "away:"]
-    room = ROOM if patient else len(swipe.frames) + 1
-    with Outputs(urls, swipe.source, patient=patient, say=said.append, room=room) as outputs:
-        for frame in swipe.frames:
+    urls = ["good:", "dying:", "away:", "stuck:"]
+    with Outputs(urls, swipe.source, patient=patient, say=said.append, room=ROOM) as outputs:
+        for count, frame in enumerate(swipe.frames, 1):
             outputs.put(frame)
-        stuck, good, dying, away = outputs.end({})
+            await_taken(outputs, count)
+        good, dying, away, stuck = outputs.end({})
     whole = len(swipe.frames) + 1
     assert [reported.frame for reported in made["good"].reported[:-1]] == swipe.frames
     assert (good["sent"], good["dropped"], good["failed"]) == (whole, 0, 0)
