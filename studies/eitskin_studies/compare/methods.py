@@ -12,7 +12,7 @@ from eitskin_studies.compare.core_method import core_methods
 from eitskin_studies.compare.families import Family, Setup
 from eitskin_studies.compare.greit import train_greit
 from eitskin_studies.compare.learned import learned_family
-from eitskin_studies.compare.pyeit_method import pyeit_method
+from eitskin_studies.compare.pyeit_method import pyeit_methods
 
 ENTRY_POINT_GROUP = "eitskin.methods"
 STRENGTHS = (1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 1e-3, 1e-2)
@@ -31,7 +31,7 @@ def methods(setup: Setup, threads: int = 1, dataset: Path | None = None) -> tupl
     """
     classic = baseline_methods(setup.jacobian, setup.grid)
     converged = plain_fista(setup.jacobian, 3000, signed=False, ratios=CONVERGED_RATIOS)
-    theirs = (pyeit_method(setup),) if find_spec("pyeit") else ()
+    theirs = pyeit_methods(setup) if find_spec("pyeit") else ()
     learned = () if dataset is None else (learned_family(setup, dataset),)
     others = (*classic, converged, *theirs, *learned, *own_methods(setup))
     return (*others, *core_methods(setup, threads))

@@ -358,7 +358,9 @@ export class VoltsDrawing {
       top = Math.max(top, Math.abs(volts[k]), known ? Math.abs(reference[k]) : 0);
       if (known) apart = Math.max(apart, Math.abs(volts[k] - reference[k]));
     }
-    const left = 66, bottom = height - 18, middle = bottom / 2, enlarged = apart > 0 ? Math.min(1000, (0.9 * top) / apart) : 1;
+    const left = 66, bottom = height - 18, middle = bottom / 2;
+    // noise stays a thin line: 60 dB times 100 is a tenth of the largest voltage
+    const enlarged = apart > 0 ? Math.min(100, (0.9 * top) / apart) : 1;
     const x = (k) => left + ((k + 0.5) / volts.length) * (width - left - 4);
     const y = (v) => middle - (v / top) * (middle - 6);
     context.strokeStyle = colour("--line");
@@ -374,8 +376,8 @@ export class VoltsDrawing {
     }
     context.textAlign = "left";
     context.textBaseline = "alphabetic";
-    const times = known && apart > 0 ? `; difference up to ${inMillivolts(apart)}, × ${enlarged.toPrecision(2)}` : "";
-    context.fillText(`${volts.length} rows${times}`, left, height - 4);
+    const times = known && apart > 0 ? `; difference up to ${inMillivolts(apart)}, × ${Number(enlarged.toPrecision(2))}` : "";
+    context.fillText(`${volts.length} rows${times}`, 4, height - 4);
     const line = (value, name, wide) => {
       context.strokeStyle = colour(name);
       context.lineWidth = wide;
