@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from eitskin.frames.front_end import SOURCE_REACH_V
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
 from eitskin_studies.experiments.patterns.measuring import (
     BOUND,
@@ -141,7 +142,7 @@ def _details(found: Mapping[tuple[str, str], Mapping[str, Any]]) -> Table:
 def _scans(scans: list[Scan], beyond: Mapping[str, float]) -> Table:
     head = (
         "pattern", "rows", "independent", "rms(V0), V at 1 mA", "greatest, V at 1 mA",
-        "source at .5 mA, of 12 V", "converter at .5 mA and gain 3, of 1.65 V",
+        f"source at .5 mA, of {SOURCE_REACH_V:g} V", "converter at .5 mA and gain 3, of 1.65 V",
         "resistors that suit: mA, gain", "rows out of range, gain per row",
     )  # fmt: skip
     rows = tuple(
