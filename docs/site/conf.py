@@ -79,7 +79,14 @@ extensions = [
     "hawkmoth",
     "sphinx_copybutton",
 ]
-include_patterns = ["*.md", "docs/**", "hardware/*.md", "hardware/made/*.md", "studies/results/**"]
+include_patterns = [
+    "*.md",
+    "docs/**",
+    "hardware/*.md",
+    "hardware/made/*.md",
+    "studies/results/**",
+    "tests/python/docs/mistakes.md",
+]
 external_toc_path = "docs/site/_toc.yml"
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
