@@ -52,6 +52,18 @@ def test_the_readmes_numbers_are_those_of_the_pages(tmp_path):
         fill_readme(copy, RESULTS)
 
 
+def test_the_sentences_to_doubt_have_the_numbers_of_the_pages_they_link_to():
+    page = (RESULTS / "README.md").read_text(encoding="utf-8")
+    rows = page.split("## Ten sentences to doubt first")[1].split("\n## ")[0].splitlines()
+    rows = [row for row in rows if row.startswith('| "')]
+    assert len(rows) == 10
+    for row in rows:
+        linked = set(re.findall(r"\]\(([^)#]+\.md)", row)) | {"../../README.md"}
+        pages = " ".join((RESULTS / name).read_text(encoding="utf-8") for name in linked)
+        numbers = re.findall(r"(?<!\w)\.\d{3}\b|\b\d+\.\d\d\b|\b\d+(?: to \d+)? %", row)
+        assert [one for one in numbers if one not in " ".join(pages.split())] == [], row
+
+
 @pytest.mark.parametrize(
     ("cell", "said"),
     [
