@@ -11,7 +11,7 @@ from eitskin.scene.description import load_scene
 from eitskin_studies.benchmarks import latency
 from eitskin_studies.benchmarks.latency import Press, Reported, judge
 from eitskin_studies.harness.sections import fill_marks
-from eitskin_studies.pictures.latency_picture import draw_latency
+from eitskin_studies.pictures.latency_picture import latency_drawing
 from study_pages import page_copy
 
 
@@ -65,5 +65,5 @@ def test_a_run_fills_the_page(tmp_path, monkeypatch):
     assert "whole frames" in latency.as_text(result)
     ordered = latency._model(tmp_path, "by 7")
     assert ordered is not None and load_model(ordered)[0].protocol.drive_order[1] == 7
-    draw_latency(tmp_path / "latency.png", result)
+    latency_drawing(result)(tmp_path / "latency.png")
     assert (tmp_path / "latency.png").stat().st_size > 10_000

@@ -20,7 +20,7 @@ from eitskin_studies.benchmarks import limit, limit_bound, limit_page, limit_sce
 from eitskin_studies.benchmarks.limit_scenes import exact_scenes
 from eitskin_studies.experiments.electrodes.patterns import from_transfer
 from eitskin_studies.harness.sections import fill_marks
-from eitskin_studies.pictures.limit_picture import draw_limit
+from eitskin_studies.pictures.limit_picture import limit_drawing
 from study_pages import page_copy
 
 SCENES = 3
@@ -56,7 +56,7 @@ def test_a_short_run_gives_every_line_and_fills_the_page(result, cache, tmp_path
     text = page.read_text()
     assert "Made by `the command`" in text and "| 40 dB |" in text
     assert text.index("<!-- fails -->") < text.index("<!-- conditions -->")
-    draw_limit(tmp_path / "p.png", result)
+    limit_drawing(result)(tmp_path / "p.png")
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
     kept = {path: path.stat().st_mtime_ns for path in cache.iterdir()}
     assert len(kept) == SCENES

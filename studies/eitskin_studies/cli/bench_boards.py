@@ -185,7 +185,6 @@ def add_latency(what: Any) -> None:
     option(parser, "--emulated", "presses on the emulated board, about 10 s each", default=12)
     option(parser, "--seed", "seed of presses and noise", default=1)
     option(parser, "--order ORDER", 'measure also with drives in this order, such as "by 7"')
-    option(parser, "--picture FILE.png", "draw when presses were reported", Path)
     add_page_option(parser, "latency")
     parser.set_defaults(run=run_latency)
 
@@ -194,16 +193,18 @@ def run_latency(options: argparse.Namespace) -> int:
     """Time presses."""
     from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import latency
-    from eitskin_studies.pictures.latency_picture import draw_latency
+    from eitskin_studies.harness.drawings import draw_again, keep_drawings
+    from eitskin_studies.pictures.latency_picture import latency_drawing
 
     check_within("--presses", options.presses, 1, 10_000)
     check_within("--emulated", options.emulated, 0, 1000)
     check_within("--seed", options.seed, 0, 2**31)
-    refuse_unwritable(options.page, options.picture)
+    refuse_unwritable(options.page)
     order = options.order or ""
     result = latency.run(options.presses, options.emulated, options.seed, order)
-    if options.picture is not None:
-        draw_latency(options.picture, result)
+    if options.page is not None:
+        keep_drawings(options.page, {"pictures/latency.svg": latency_drawing(result)})
+        draw_again(options.page)
     command = (
         f"eitskin bench latency --presses {options.presses} --emulated {options.emulated} --seed"
         f" {options.seed}" + f' --order "{order}"' * bool(order)

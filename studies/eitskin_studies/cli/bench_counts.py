@@ -178,7 +178,6 @@ def add_limit(what: Any) -> None:
     option(
         parser, "--cache DIR", "folder that keeps exact frames, and models of other patterns", Path
     )
-    option(parser, "--picture PNG", "draw the errors and the bound", Path)
     add_page_option(parser, "limit")
     parser.set_defaults(run=run_limit)
 
@@ -189,14 +188,12 @@ def run_limit(options: argparse.Namespace) -> int:
     from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import limit as bench_limit
     from eitskin_studies.benchmarks import limit_page
+    from eitskin_studies.harness.drawings import draw_again, keep_drawings
+    from eitskin_studies.pictures.limit_picture import limit_drawing
 
     check_within("--scenes", options.scenes, 1, 100_000)
     check_within("--seed", options.seed, 0, 2**31 - 1)
-    refuse_unwritable(options.page, options.picture)
-    if options.picture is not None:
-        from eitskin.view.panels import check_picture
-
-        check_picture(options.picture)
+    refuse_unwritable(options.page)
     chosen: dict[str, Any] = {
         name: tuple(names.split(","))
         for name in ("sets", "patterns")
@@ -206,12 +203,11 @@ def run_limit(options: argparse.Namespace) -> int:
         options.scenes, options.seed, model=options.model, cache=options.cache, **chosen
     )
     result = bench_limit.run(settings, named_bar)
-    if options.picture is not None:
-        from eitskin_studies.pictures.limit_picture import draw_limit
-
-        draw_limit(options.picture, result)
+    if options.page is not None:
+        keep_drawings(options.page, {"pictures/limit.svg": limit_drawing(result)})
+        draw_again(options.page)
     command = f"eitskin bench limit --scenes {options.scenes} --seed {options.seed}"
-    for name in ("sets", "patterns", "model", "picture"):
+    for name in ("sets", "patterns", "model"):
         if getattr(options, name) is not None:
             command += f" --{name} {getattr(options, name)}"
     filling = limit_page.for_page(result, command)

@@ -24,15 +24,14 @@ OTHERS = {
     "tradeoff": "tradeoff run -o out/tradeoff --page {page}"
     " --recorded studies/eitskin_studies/tradeoff/front.json"
     " --front python/eitskin/tuning/front.json",
-    "limit": "bench limit --scenes 60 --seed 1 --page {page} --picture {pictures}/limit.png",
+    "limit": "bench limit --scenes 60 --seed 1 --page {page}",
     "diagnostics": "bench diagnostics --scenes 320 --crowds 24 --imperfect 40 --seed 4001"
     " --page {page}",
     "gestures": "bench gestures --sessions 60 --seed 7001 --role judging --snr-db 60 40"
     " --page {page}",
     "peers": "bench peers --scenes 20 --seed 1 --page {page}",
     "scene-cost": "bench effects --frames 40 --page {page}",
-    "latency": "bench latency --presses 200 --emulated 24 --seed 1 --order 'by 7' --page {page}"
-    " --picture {pictures}/latency.png",
+    "latency": "bench latency --presses 200 --emulated 24 --seed 1 --order 'by 7' --page {page}",
     "board-cost": "bench board --scenes 180 --seed 1 --frames 12 --page {page}",
     "energy": "bench energy --page {results}/board-cost.md",
     "outputs": "bench outputs --taps 24 --seconds 20 --load 600 --seed 1 --page {page}",
