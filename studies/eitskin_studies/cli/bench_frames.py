@@ -39,7 +39,7 @@ def add_solve(what: Any) -> None:
     option(parser, "--scenes", "problems for each model", default=20)
     option(parser, "--seed", "seed of the scenes", default=3)
     option(parser, "--rounds", "interleaved rounds", default=11)
-    option(parser, "--picture PNG", "draw suboptimality against MIoU instead", Path)
+    option(parser, "--picture FILE", "draw suboptimality against MIoU instead", Path)
     option(parser, "--json")
     parser.set_defaults(run=run_solve)
 
@@ -54,10 +54,10 @@ def run_solve(options: argparse.Namespace) -> int:
     refuse_unwritable(options.picture)
     if options.picture is not None:
         from eitskin_studies.benchmarks import suboptimality
-        from eitskin_studies.pictures.suboptimality_picture import draw
+        from eitskin_studies.pictures.suboptimality_picture import draw_suboptimality
 
         curves = suboptimality.run(options.scenes, options.seed, progress_bar)
-        draw(options.picture, curves)
+        draw_suboptimality(options.picture, curves.as_dict())
         print(
             json.dumps(curves.as_dict(), indent=2) if options.json else suboptimality.text(curves)
         )

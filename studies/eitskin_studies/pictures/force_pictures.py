@@ -15,6 +15,7 @@ from eitskin.view.pictures import INK, RIM, STYLE, load_matplotlib
 from eitskin_studies.experiments.force.law import WEIGHTS_G
 from eitskin_studies.experiments.force.readouts import INTEGRAL, PEAK, TOUCH
 from eitskin_studies.experiments.force.scenes import RADIUS_SHARES
+from eitskin_studies.pictures.style import BLUE, GREEN, PURPLE, VERMILION
 
 if TYPE_CHECKING:
     from eitskin_studies.experiments.force.anywhere import Anywhere
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from eitskin_studies.experiments.force.detection import Detection
 
 
-COLOURS = ("#7b1fa2", "#1565c0", "#00796b", "#c75b00")  # from the centre to the rim
+COLOURS = (PURPLE, BLUE, GREEN, VERMILION)  # from the centre to the rim
 NAMES = ("centre", *(f"{share:g} R" for share in RADIUS_SHARES[1:]))
 SHOWN = ((PEAK, "peak (S/m)"), (INTEGRAL, "integral (S/m mm²)"), (TOUCH, "strength (S/m mm²)"))
 

@@ -5,8 +5,9 @@ from pathlib import Path
 from eitskin.view.panels import save_picture
 from eitskin.view.pictures import INK, STYLE, load_matplotlib
 from eitskin_studies.benchmarks.growth import GrowthTimes, exponent
+from eitskin_studies.pictures.style import BLUE, GREY, VERMILION
 
-SOLVE, TOUCHES, MACS = "#1f6fb4", "#d1661f", "#7a7a7a"
+SOLVE, TOUCHES, MACS = BLUE, VERMILION, GREY
 
 
 def draw_growth(path: str | Path, result: GrowthTimes) -> None:
@@ -52,7 +53,7 @@ def draw_growth(path: str | Path, result: GrowthTimes) -> None:
             axes.set_title(f"{name}\ntime ~ value^{slope:.2f}", color=INK)
             axes.set_xlabel(name.split(",")[0])
             if number == 0:
-                axes.set_ylabel("µs a frame")
+                axes.set_ylabel("µs per frame")
                 lines = [*axes.get_lines(), *other.get_lines()]
                 axes.legend(
                     lines,
@@ -62,7 +63,7 @@ def draw_growth(path: str | Path, result: GrowthTimes) -> None:
                     fontsize=7,
                 )
             if number == len(names) - 1:
-                other.set_ylabel("multiply-accumulates a frame")
+                other.set_ylabel("multiply-accumulates per frame")
             else:
                 other.set_yticklabels([])
             if number:

@@ -23,15 +23,23 @@ from eitskin_studies.experiments.multitouch.measure import Ambiguities, CountedS
 from eitskin_studies.experiments.multitouch.tables import NAMES, SHORT
 from eitskin_studies.experiments.multitouch.test_data import CLASSICAL, HEADLINE_DB, SNRS_DB
 from eitskin_studies.pictures.comparison_pictures import truth_marks
+from eitskin_studies.pictures.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREY,
+    PURPLE,
+    SNR_COLOURS,
+    VERMILION,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SNR_COLOURS = {40.0: "#b26a00", 60.0: "#00796b", 80.0: "#283593"}
-CLASSICAL_COLOURS = ("#9e9e9e", "#5d4037", "#c2185b")
+CLASSICAL_COLOURS = (GREY, BLACK, PURPLE)
 TITLES = {RING: "ring of 60 mm", WIDE: "random, 4 radii apart", NARROW: "random, 2.5 radii apart"}
 NEAREST_EDGES = (0.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.5, 20.0)
-SAID, NOT_SAID = "#c62828", "#00796b"
+REPORTED, NOT_REPORTED = VERMILION, BLUE
 
 
 def draw_counts(path: str | Path, counted: CountedScenes) -> None:
@@ -158,7 +166,9 @@ def draw_ambiguity(path: str | Path, ambiguities: Ambiguities) -> None:
                 if (row, column) == (0, 0):
                     axes.legend(frameon=False, fontsize=7, loc="lower left")
                 axes.set_xlabel(title)
-                axes.set_title(f"{signal}: {100 * said.mean():.0f} % of frames", fontsize=9)
+                axes.set_title(
+                    f"{signal}: reported in {100 * said.mean():.0f} % of frames", fontsize=9
+                )
                 if column == 0:
                     axes.set_ylabel("share with the right count")
         axes = figure.add_subplot(2, 4, 4)
@@ -189,16 +199,16 @@ def _bars(
 ) -> None:
     right = np.array([f.right for f in frames], dtype=np.bool_)
     for offset, which, colour, label in (
-        (-0.15, ~said, NOT_SAID, "not said"),
-        (0.15, said, SAID, "said"),
+        (-0.15, ~said, NOT_REPORTED, "frames without the report"),
+        (0.15, said, REPORTED, "frames with it"),
     ):
         shares = [share_of(right[which & (group == k)]) for k in range(len(ticks))]
         kept = [(k, one) for k, one in enumerate(shares) if one.count >= 5]
         _points(axes, [k + offset for k, _ in kept], [one for _, one in kept], colour, label)
     whole = np.array([max(1, int((group == k).sum())) for k in range(len(ticks))])
     axes.bar(range(len(ticks)), [said[group == k].sum() / whole[k] for k in range(len(ticks))],
-        color=SAID, alpha=0.13, zorder=0,
-             label="share said")  # fmt: skip
+        color=REPORTED, alpha=0.13, zorder=0,
+             label="share of frames with it")  # fmt: skip
     axes.set(ylim=(0, 1.03), xlim=(-0.6, len(ticks) - 0.4))
     axes.set_xticks(range(len(ticks)), ticks, fontsize=7)
 
@@ -229,7 +239,7 @@ def _chances(axes: Axes, ambiguities: Ambiguities) -> None:
             axes,
             [c for c, _ in kept],
             [t for _, t in kept],
-            f"C{number}",
+            COLOURS[number],
             f"{name}, Brier {one.brier:.3f}",
         )
     axes.set(xlabel="chance by the score", ylabel="share exact", xlim=(0, 1), ylim=(0, 1.03))
@@ -262,9 +272,12 @@ def _trade(axes: Axes, ambiguities: Ambiguities) -> None:
             )
     axes.axhline(0.95, color=INK, linewidth=0.7, linestyle=":")
     axes.set(
-        xlabel="share of frames not said", ylabel="of these exact", xlim=(0, 1), ylim=(0.3, 1.03)
+        xlabel="share of frames without the report",
+        ylabel="share of these that are exact",
+        xlim=(0, 1),
+        ylim=(0.3, 1.03),
     )
-    axes.set_title("the bar's choice; crosses: crowded", fontsize=9)
+    axes.set_title("by the threshold of the score; crosses: crowded", fontsize=9)
     axes.legend(frameon=False, fontsize=7, loc="lower left")
 
 
@@ -277,7 +290,7 @@ def draw_touch_scores(path: str | Path, ambiguities: Ambiguities) -> None:
     """
     matplotlib = load_matplotlib()
     with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(3.9 * len(NAMES), 3.9), layout="constrained")
+        figure = matplotlib.figure.Figure(figsize=(3.9 * len(NAMES), 4.4), layout="constrained")
         for number, name in enumerate(NAMES):
             axes = figure.add_subplot(1, len(NAMES), number + 1)
             one = ambiguities.touches[name]
@@ -286,13 +299,19 @@ def draw_touch_scores(path: str | Path, ambiguities: Ambiguities) -> None:
                 ("its root over noise", one.over_noise),
                 ("strength / greatest", one.strength),
             )
-            for text, values in named:
+            for (text, values), colour in zip(named, COLOURS, strict=False):
                 false, true = roc(values, one.true)
-                axes.plot(false, true, linewidth=1.3, label=f"{text}: {auc(values, one.true):.3f}")
+                axes.plot(
+                    false,
+                    true,
+                    linewidth=1.3,
+                    color=colour,
+                    label=f"{text}: {auc(values, one.true):.3f}",
+                )
             axes.plot([0, 1], [0, 1], color=INK, linewidth=0.7, linestyle=":")
             axes.set(
-                xlabel="false touches above the bar",
-                ylabel="true touches above the bar",
+                xlabel="share of false touches above the threshold",
+                ylabel="share of true touches above the threshold",
                 title=name,
                 aspect="equal",
             )

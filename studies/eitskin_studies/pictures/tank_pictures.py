@@ -13,6 +13,7 @@ from eitskin.view.pictures import STYLE, Mark, Panel, load_matplotlib
 from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.tanks import tank, touch_like
 from eitskin_studies.harness.thresholds import THRESHOLDS
+from eitskin_studies.pictures.style import BLUE, VERMILION
 
 ROD_MM = 8.0  # as drawn; how thick the rods were is not stated
 SHORT = (
@@ -103,14 +104,19 @@ def draw_curves(path: str | Path, results: Sequence[dict[str, Any]]) -> None:
         for ax in axes.flat[len(results) :]:
             ax.set_axis_off()
         for ax, one in zip(axes.flat, results, strict=False):
-            ax.plot(THRESHOLDS, one["tuned_curve"], color="C0", label="simulated")
-            ax.plot(THRESHOLDS, one["touch_like_curve"], "--", color="C1", label="measured")
+            ax.plot(THRESHOLDS, one["tuned_curve"], color=BLUE, label="simulated")
+            ax.plot(THRESHOLDS, one["touch_like_curve"], "--", color=VERMILION, label="measured")
             ax.plot(
-                one["threshold"], float(np.mean(one["touch_like"])), "o", color="C1", markersize=5
+                one["threshold"],
+                float(np.mean(one["touch_like"])),
+                "o",
+                color=VERMILION,
+                markersize=5,
             )
-            ax.axvline(one["threshold"], color="C0", linewidth=0.7, linestyle=":")
+            ax.axvline(one["threshold"], color=BLUE, linewidth=0.7, linestyle=":")
             ax.set_title(f"{_short(one['name'])}\n{one['kind']}", fontsize=8)
             ax.set_ylim(0.4, 1.0)
+            ax.tick_params(labelbottom=True)
             ax.grid(linewidth=0.4, alpha=0.5)
         axes.flat[0].legend(frameon=False, fontsize=7, loc="lower left")
         figure.supxlabel("threshold t: an object is where x > t max(x)", fontsize=9)
