@@ -14,8 +14,8 @@ bytes   what
 rest    UTF-8: the frame's message (message.schema.json) without the two above
 ======  ==========================================================
 
-All else is text, a JSON object with a ``type``: to the page ``setup``, ``state``, ``notice``,
-``page``, ``teach`` and ``answer``; from it ``hello``, ``drawn`` and ``do``
+All else is text, a JSON object with a ``type``: to the page ``setup``, ``surface``, ``state``,
+``notice``, ``page``, ``teach`` and ``answer``; from it ``hello``, ``drawn`` and ``do``
 (docs/guide/live-view.md).
 """
 
@@ -34,6 +34,7 @@ from eitskin.session.message import encoded
 from eitskin.session.robot_session import AnySession
 from eitskin.session.session import Session
 from eitskin.session.settings import KINDS
+from eitskin.surface.surface_map import SurfaceMap
 
 MAGIC = b"EVF1"
 HEAD = struct.Struct("<4sIII")
@@ -111,21 +112,26 @@ def _one(name: str, session: Session, base: Pose | None) -> dict[str, Any]:
         "has_truth": session.observer is not None,
         "finger_mm": session.capabilities.finger_mm,
         "skin": _skin(session),
-        "surface": _surface(session),
     }
 
 
-def _surface(session: Session) -> dict[str, Any] | None:
-    """The surface that a skin covers, in the frame that ``pose`` maps, and the place of each of its
-    vertices in the skin's drawing; None for a flat skin."""
-    surface = None if session.known is None else session.known.model.surface
-    if surface is None:
-        return None
-    return {
-        "flat_mm": _rounded(surface.flat_mm),
-        "points_m": np.round(surface.points_m(), 6).tolist(),
-        "triangles": surface.triangles.tolist(),
-    }
+def surface_of(session: Session) -> SurfaceMap | None:
+    """The surface that a session's skin covers; None for a flat skin."""
+    return None if session.known is None else session.known.model.surface
+
+
+def surface_text(source: str, surface: SurfaceMap | None) -> str:
+    """The surface of a skin, in the frame that ``pose`` maps, with the place of each of its
+    vertices in the skin's drawing. It is large, so that a page gets it once and not with each
+    ``setup``."""
+    facts = None
+    if surface is not None:
+        facts = {
+            "flat_mm": _rounded(surface.flat_mm),
+            "points_m": np.round(surface.points_m(), 6).tolist(),
+            "triangles": surface.triangles.tolist(),
+        }
+    return text_of("surface", source=source, surface=facts)
 
 
 def _skin(session: Session) -> dict[str, Any] | None:

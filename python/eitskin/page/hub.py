@@ -6,6 +6,9 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
+from eitskin.page.facts import surface_text
+from eitskin.surface.surface_map import SurfaceMap
+
 IN_FLIGHT = 4  # frames of each skin that a page may have without having drawn them
 TEXTS = 200  # messages that wait for a page; the oldest go first
 
@@ -31,6 +34,9 @@ class PageClient:
             maxlen=100
         )  # from complete to drawn, as the page reports
         self._texts: deque[str] = deque(maxlen=TEXTS)
+        self._surfaces: dict[str, str] = {}  # that wait, by source; none may be lost
+        self.shown: dict[str, SurfaceMap | None] = {}
+        """The surface of each skin that the page has, or will get."""
         self._frames: dict[str | None, Outgoing] = {}  # by source, in the order of their turns
         self._sources: set[str | None] = set()
         self._flying: dict[int, int] = {}
@@ -48,6 +54,13 @@ class PageClient:
         self._texts.append(text)
         self._changed.set()
 
+    def show(self, source: str, surface: SurfaceMap | None) -> None:
+        """The surface of a skin, if the page has another one; it comes before all else."""
+        if self.shown.get(source) is not surface:
+            self.shown[source] = surface
+            self._surfaces[source] = surface_text(source, surface)
+            self._changed.set()
+
     def drawn(self, number: int) -> None:
         """The page has drawn frame ``number``, and all that were sent before it."""
         arrived = self._flying.get(number)
@@ -60,6 +73,8 @@ class PageClient:
     async def next(self) -> str | bytes:
         """Wait for the next message to send, and return it."""
         while True:
+            if self._surfaces:
+                return self._surfaces.pop(next(iter(self._surfaces)))
             if self._texts:
                 return self._texts.popleft()
             if self._frames and len(self._flying) < IN_FLIGHT * len(self._sources):

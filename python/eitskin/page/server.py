@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 
 from eitskin.errors import EitskinError, UsageError, missing_extra
 from eitskin.page.commands import PageCommands
-from eitskin.page.facts import frame_bytes, setup_text, text_of
+from eitskin.page.facts import frame_bytes, setup_text, surface_of, text_of
 from eitskin.page.hub import Hub, Outgoing, PageClient
 from eitskin.page.reader import AttachOutputs, SessionReader
 from eitskin.page.teacher import Teacher
@@ -204,6 +204,8 @@ class PageServer:
     def _tell_setup(self, page: PageClient) -> None:
         session = self.reader.session or self.reader.last
         if session is not None:
+            for name, part in session.parts.items():
+                page.show(name, surface_of(part))
             page.tell(setup_text(session, page.may_command, self.reader.length_s))
 
     def _app(self) -> Starlette:

@@ -5,6 +5,7 @@ import base64
 import io
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ from served import Page, serving, until
 
 from eitskin.model.eitm import save_model
 from eitskin.page.server import PageServer
+from eitskin.surface.flatten import flattened
+from eitskin.surface.shapes import make_shape
 from eitskin.surface.surface_map import SurfaceMap
 from small_models import prebuilt
 
@@ -149,6 +152,40 @@ def test_the_mouse_presses_the_surface(round_skin, server):
     until(found)
     mouse(round_skin, "mouseReleased", 0.5, 0.65)
     until(lambda: board.fingers == () and len(round_skin.touches()) == 1)
+
+
+@pytest.fixture(scope="module")
+def dome(folder, page) -> Iterator[PageServer]:
+    """The paper's skin over half a ball, where a mm of the drawing stands for 1 to 2 mm: nothing
+    touches it."""
+    points_mm, triangles = make_shape("hemisphere", 1500)
+    flat_mm = flattened(points_mm, triangles)
+    size = 97.0 / np.linalg.norm(flat_mm, axis=1).max()
+    surface = SurfaceMap(size * flat_mm, size * points_mm, triangles, "head")
+    assert surface.scale_range[1] > 1.8
+    save_model(folder / "dome.eitm", replace(prebuilt()[0], surface=surface))
+    (folder / "none.toml").write_text("[scene]\nframes = 12\nelements = 2500\nrate_hz = 24.0\n")
+    with serving(f"sim:{folder}/none.toml?loop=1", model=folder / "dome.eitm") as one:
+        yield one
+
+
+def test_a_press_lands_under_the_pointer_where_the_drawing_is_distorted(dome, page):
+    page.open(dome)
+    until(lambda: page.shown("surface") and page.text("n-rate").endswith("Hz"))
+    board = dome.reader.live().device.transport.board  # type: ignore[union-attr]
+    pressed = []
+    for x, y in ((0.5, 0.5), (0.42, 0.6), (0.6, 0.45)):
+        until(lambda: red(pixels(page)) == 0)
+        mouse(page, "mousePressed", x, y)
+        until(lambda: board.fingers and red(pixels(page)) > 60)
+        drawn = pixels(page)
+        rows, columns = np.nonzero(drawn[..., 0] - drawn[..., 1] > 80)
+        height, width = drawn.shape[:2]
+        assert np.hypot(columns.mean() - x * width, rows.mean() - y * height) < 0.02 * width
+        pressed.append((board.fingers[0].x_mm, board.fingers[0].y_mm))
+        mouse(page, "mouseReleased", x, y)
+        until(lambda: not board.fingers)
+    assert min(np.hypot(*np.subtract(a, b)) for a, b in combinations(pressed, 2)) > 8
 
 
 def test_the_flat_view_is_one_press_away(round_skin):

@@ -1,5 +1,6 @@
 """A robot on the live page: every skin's frames, and commands for all of them."""
 
+import asyncio
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +15,8 @@ from eitskin.page.facts import HEAD
 from eitskin.page.hub import IN_FLIGHT, Outgoing, PageClient
 from eitskin.page.server import PageServer
 from eitskin.robot.description import load_robot
+from eitskin.surface.outline import surface_map
+from eitskin.surface.shapes import make_shape
 
 ARM = Path(__file__).resolve().parents[3] / "examples" / "robot" / "arm.urdf"
 SKINS = ["upper_arm", "forearm", "palm"]
@@ -84,9 +87,26 @@ def test_a_page_gets_the_newest_frame_of_each_skin_in_turn():
     for number, source in enumerate("abab", 1):
         page.offer(Outgoing(number, source.encode(), 0, source))
     assert page.dropped == 2
-    import asyncio
-
     assert [asyncio.run(page.next()) for _ in "ab"] == [b"a", b"b"]
     for number in range(5, 5 + 2 * IN_FLIGHT):
         page.offer(Outgoing(number, b"c", 0, "a"))
     assert page.dropped == 2 + 2 * IN_FLIGHT - 1
+
+
+def test_a_page_gets_a_surface_once_and_before_the_setup():
+    """A setup comes with each change of state, and a surface of 4,000 triangles has 160 kB."""
+    page, surface = PageClient(), surface_map(*make_shape("saddle", 200))
+
+    def came(count: int) -> list[object]:
+        texts = [asyncio.run(page.next()) for _ in range(count)]
+        return [text if text == "setup" else json.loads(text)["surface"] for text in texts]
+
+    for _ in range(2):
+        page.tell("setup")
+        page.show("a", surface)
+        page.show("flat", None)
+    first, *setups = came(3)
+    assert isinstance(first, dict) and len(first["triangles"]) == len(surface.triangles)
+    assert setups == ["setup"] * 2
+    page.show("a", None)  # a model without it was uploaded
+    assert came(1) == [None]

@@ -17,7 +17,7 @@ const space = new SurfaceDrawing($("surface"), $("labels"));
 const plots = new PlotsDrawing($("plots"));
 const volts = new VoltsDrawing($("volts"));
 const page = {
-  socket: null, setup: null, frames: new Map(), shown: null, images: new Map(), asked: false, times: [], health: {}, dropped: 0, skipped: 0,
+  socket: null, setup: null, surfaces: new Map(), newSurface: false, frames: new Map(), shown: null, images: new Map(), asked: false, times: [], health: {}, dropped: 0, skipped: 0,
   wordsAt: 0, words: "", gestures: [], pressed: new Set(), state: "", teach: null,
   fingers: new Map(), turning: new Map(), pressing: false, pressAgain: false, seeking: false,
 };
@@ -30,6 +30,7 @@ function connect() {
   socket.binaryType = "arraybuffer";
   socket.onopen = () => {
     page.pressing = false;
+    page.surfaces.clear();
     socket.send(JSON.stringify({ type: "hello", token }));
   };
   socket.onmessage = ({ data }) => (typeof data === "string" ? take(JSON.parse(data)) : takeFrame(data));
@@ -112,6 +113,7 @@ function soon() {
 
 function take(message) {
   if (message.type === "setup") return takeSetup(message);
+  if (message.type === "surface") return takeSurface(message);
   if (message.type === "state") return setState(message.state, message.text);
   if (message.type === "answer") return answer(message);
   if (message.type === "notice") return note(message);
@@ -135,6 +137,12 @@ function setState(state, text) {
   showPlay();
 }
 
+// A skin's surface comes before the setup that needs it, and not again with the next ones.
+function takeSurface({ source, surface }) {
+  page.surfaces.set(source, surface);
+  page.newSurface = true;
+}
+
 function takeSetup(setup) {
   const before = page.setup;
   page.setup = setup;
@@ -142,7 +150,9 @@ function takeSetup(setup) {
   $("device").textContent = `${setup.name && setup.name + " · "}${setup.url} · ${setup.board}, ${setup.electrodes} electrodes`;
   document.title = `${setup.url} · eitskin`;
   const what = ({ model_crc, url, skins }) => JSON.stringify([model_crc, url, skins.map((one) => [one.source, one.pose, Boolean(one.skin)])]);
-  if (!before || what(before) !== what(setup)) takeSkins(setup.skins);
+  for (const one of setup.skins) one.surface = page.surfaces.get(one.source) || null;
+  if (!before || page.newSurface || what(before) !== what(setup)) takeSkins(setup.skins);
+  page.newSurface = false;
   const may = setup.may_command, board = may && !setup.replays;
   $("undo").hidden = !setup.can_undo_tare;
   for (const id of ["tare", "undo", "record", "preset", "sign", "iterations", "model"]) $(id).disabled = !board;
