@@ -45,7 +45,7 @@ def test_every_table_has_its_place_on_the_page(done, tmp_path):
     outcome = done[1]
     names = "slopes anywhere by-load over-snr detection sheet-slopes smallest reach"
     assert [table.name for table in outcome.tables] == names.split()
-    assert set(outcome.pictures) == {"curves.png", "skin.png", "detection.png"}
+    assert set(outcome.pictures) == {"curves.svg", "skin.svg", "detection.svg"}
     fills_its_page(outcome, "force", tmp_path)
     assert "Infinity" not in to_json(outcome) and "NaN" not in to_json(outcome)
 

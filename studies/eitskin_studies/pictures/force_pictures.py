@@ -3,139 +3,115 @@ the SNR."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from eitskin.arrays import FloatArray
-from eitskin.skin.skin import Skin
-from eitskin.view.panels import save_picture
-from eitskin.view.pictures import INK, RIM, STYLE, load_matplotlib
-from eitskin_studies.experiments.force.law import WEIGHTS_G
-from eitskin_studies.experiments.force.readouts import INTEGRAL, PEAK, TOUCH
-from eitskin_studies.experiments.force.scenes import RADIUS_SHARES
-from eitskin_studies.pictures.style import BLUE, GREEN, PURPLE, VERMILION
-
-if TYPE_CHECKING:
-    from eitskin_studies.experiments.force.anywhere import Anywhere
-    from eitskin_studies.experiments.force.curves import ForceCurves
-    from eitskin_studies.experiments.force.detection import Detection
-
+from eitskin.view.pictures import INK, RIM
+from eitskin_studies.pictures.style import (
+    BLUE,
+    GREEN,
+    MARKERS,
+    PURPLE,
+    VERMILION,
+    drawing,
+    legend_below,
+    plain_axes,
+    plain_ticks,
+)
 
 COLOURS = (PURPLE, BLUE, GREEN, VERMILION)  # from the centre to the rim
-NAMES = ("centre", *(f"{share:g} R" for share in RADIUS_SHARES[1:]))
-SHOWN = ((PEAK, "peak (S/m)"), (INTEGRAL, "integral (S/m mm²)"), (TOUCH, "strength (S/m mm²)"))
 
 
-def draw_curves(path: Path, curves: dict[str, ForceCurves]) -> None:
-    """Readings over weight at the four radii, three readouts side by side, with 90 % bands over the
-    laws.
+def draw_curves(path: Path, data: Mapping[str, Any]) -> None:
+    """Readings over weight at the four radii, side by side, with 90 % bands over the laws. ``data``
+    has ``weights_g``, the names of ``places``, and ``readings``: name, unit, and by place mean, low
+    and high at each weight.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(11.4, 4.0), layout="constrained")
-        for k, (name, unit) in enumerate(SHOWN):
-            axes, one = figure.add_subplot(1, len(SHOWN), k + 1), curves[name]
-            low, high = np.nanquantile(one.bands, [0.05, 0.95], axis=0)
-            for radius, (colour, where) in enumerate(zip(COLOURS, NAMES, strict=True)):
+    weights_g, readings = data["weights_g"], data["readings"]
+    with drawing(path, 11.4, 4.4) as figure:
+        panels = figure.subplots(1, len(readings))
+        for axes, one in zip(panels, readings, strict=True):
+            for k, where in enumerate(data["places"]):
                 axes.fill_between(
-                    WEIGHTS_G, low[radius], high[radius], color=colour, alpha=0.13, linewidth=0
-                )
+                    weights_g, one["low"][k], one["high"][k], color=COLOURS[k], alpha=0.13,
+                    linewidth=0,
+                )  # fmt: skip
                 axes.plot(
-                    WEIGHTS_G, one.mean[radius], "o-", color=colour, label=where, markersize=4
-                )
-            axes.set_title(name)
+                    weights_g, one["mean"][k], marker=MARKERS[k], color=COLOURS[k], label=where,
+                    markersize=4.5,
+                )  # fmt: skip
+            axes.set_title(one["name"])
             axes.set_xlabel("weight (g)")
-            axes.set_ylabel(unit)
+            axes.set_ylabel(one["unit"])
             axes.set_ylim(bottom=0)
-            axes.grid(alpha=0.25)
-        figure.axes[0].legend(frameon=False, title="place")
-        save_picture(figure, path)
+            plain_axes(axes)
+        legend_below(figure, panels[0], len(data["places"]))
+        figure.suptitle("The value over the weight, by distance from the centre (R: the radius)")
 
 
-def draw_skin(
-    path: Path,
-    skin: Skin,
-    places_mm: FloatArray,
-    judged: dict[tuple[str, float], Anywhere],
-    snr_db: float,
-) -> None:
+def draw_skin(path: Path, data: Mapping[str, Any]) -> None:
     """Each place's error, the mean over the weights, before and after calibration, for the paper's
-    reading and for the touch.
+    reading and for the touch. ``data`` has ``rim_mm``, ``places_mm``, and ``panels``: title, errors
+    in % and the end of the colours, ``most``.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
-    panels = [(name, kind) for name in (PEAK, TOUCH) for kind in ("raw", "calibrated")]
-    limits = {PEAK: 100.0, TOUCH: 5.0}
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(13.2, 3.9), layout="constrained")
-        rim = np.vstack([np.array(skin.outline.vertices_mm), skin.outline.vertices_mm[:1]])
-        for k, (name, kind) in enumerate(panels):
-            axes = figure.add_subplot(1, len(panels), k + 1)
-            errors = 100 * np.nanmean(getattr(judged[name, snr_db], kind), axis=1)
+    rim, places, panels = np.array(data["rim_mm"]), np.array(data["places_mm"]), data["panels"]
+    with drawing(path, 13.2, 3.9) as figure:
+        row = figure.subplots(1, len(panels))
+        for k, (axes, one) in enumerate(zip(row, panels, strict=True)):
             axes.plot(*rim.T, color=RIM, linewidth=1)
-            most = limits[name]
-            style = {
-                "cmap": "RdBu_r",
-                "vmin": -most,
-                "vmax": most,
-                "s": 90,
-                "edgecolors": INK,
-                "linewidths": 0.5,
-            }
-            shown = axes.scatter(*places_mm.T, c=errors, **style)
+            shown = axes.scatter(
+                *places.T, c=one["errors"], cmap="RdBu_r", vmin=-one["most"], vmax=one["most"],
+                s=90, edgecolors=INK, linewidths=0.5,
+            )  # fmt: skip
             axes.set_aspect("equal")
             axes.set_axis_off()
-            axes.set_title(
-                f"{name}\n{kind}, mean of {len(WEIGHTS_G)} weights:"
-                f" {np.nanstd(errors, ddof=1):.1f} %"
-            )
-            if kind == "calibrated":
+            axes.set_title(one["title"])
+            if k % 2:
                 figure.colorbar(
-                    shown, ax=figure.axes[-2:] if k else axes, shrink=0.8, label="off by (%)"
+                    shown,
+                    ax=list(row[k - 1 : k + 1]),
+                    shrink=0.8,
+                    label="off by (%)",
+                    extend="both",
                 )
-        save_picture(figure, path)
 
 
-def draw_detection(path: Path, found: list[Detection]) -> None:
-    """The smallest weight over the SNR at the four radii, with 95 % intervals.
+def draw_detection(path: Path, data: Mapping[str, Any]) -> None:
+    """The smallest weight over the SNR at the four radii, with 95 % intervals. ``data`` has the
+    names of ``places``, and for each of them ``found``: SNR in dB, grams, low and high.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(6.4, 4.4), layout="constrained")
-        axes = figure.add_subplot()
-        for radius, (colour, where) in enumerate(zip(COLOURS, NAMES, strict=True)):
-            reported = np.array([(one.snr_db, *one.threshold(radius)) for one in found])
-            reported = reported[np.isfinite(reported[:, 1])]
-            top = np.where(np.isfinite(reported[:, 3]), reported[:, 3], found[0].loads_g[-1])
-            bars = np.maximum([reported[:, 1] - reported[:, 2], top - reported[:, 1]], 0)
-            snr_db = reported[:, 0] + 0.5 * (radius - 1.5)  # side by side
+    with drawing(path, 6.8, 4.8) as figure:
+        axes = figure.subplots()
+        for k, (where, found) in enumerate(zip(data["places"], data["found"], strict=True)):
+            snr_db, grams, low, high = (np.array(one) for one in zip(*found, strict=True))
             axes.errorbar(
-                snr_db,
-                reported[:, 1],
-                bars,
-                fmt="o-",
-                color=colour,
+                snr_db + 0.5 * (k - 1.5),  # side by side
+                grams,
+                np.maximum([grams - low, high - grams], 0),
+                fmt=f"{MARKERS[k]}-",
+                color=COLOURS[k],
                 label=where,
-                markersize=4,
+                markersize=4.5,
                 capsize=2,
             )
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(matplotlib.ticker.StrMethodFormatter("{x:g}"))
+        plain_ticks(axes.yaxis, (5, 10, 20, 50, 100))
         axes.set_xlabel("SNR (dB)")
         axes.set_ylabel("smallest weight detected with probability 0.9 (g)")
-        axes.grid(alpha=0.25, which="both")
-        axes.legend(frameon=False, title="place")
-        save_picture(figure, path)
+        plain_axes(axes)
+        legend_below(figure, axes, len(data["places"]))

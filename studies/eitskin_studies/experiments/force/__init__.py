@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Workspace
-from eitskin_studies.experiments.force import anywhere, curves, detection, scenes, sheet
+from eitskin_studies.experiments.force import anywhere, curves, detection, scenes, sheet, shown
 from eitskin_studies.experiments.force.law import NOMINAL, drawn_laws
 from eitskin_studies.experiments.force.readouts import (
     READOUTS,
@@ -20,6 +20,8 @@ from eitskin_studies.experiments.force.readouts import (
     as_lists,
     from_lists,
 )
+from eitskin_studies.harness.drawings import Drawing
+from eitskin_studies.pictures.force_pictures import draw_curves, draw_detection, draw_skin
 
 if TYPE_CHECKING:
     from eitskin_studies.experiments.force.scenes import PressSet
@@ -35,8 +37,6 @@ SNRS_DB = (40.0, 50.0, SNR_DB, AVERAGED_DB, 84.0)
 
 def run(workspace: Workspace) -> ExperimentOutcome:
     """All of it; what the workspace has kept is not computed again."""
-    from eitskin_studies.pictures import force_pictures as pictures
-
     settings, skin = workspace.settings, paper_skin()
     protocol = adjacent(skin.electrodes.count)
     radius_mm = (skin.outline.diameter_mm or 0.0) / 2
@@ -110,9 +110,9 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         tables,
         data,
         {
-            "curves.png": lambda path: pictures.draw_curves(path, drawn),
-            "skin.png": lambda path: pictures.draw_skin(path, skin, places, judged, AVERAGED_DB),
-            "detection.png": lambda path: pictures.draw_detection(path, found),
+            "curves.svg": Drawing(draw_curves, shown.curves_shown(drawn)),
+            "skin.svg": Drawing(draw_skin, shown.skin_shown(skin, places, judged, AVERAGED_DB)),
+            "detection.svg": Drawing(draw_detection, shown.detection_shown(found)),
         },
         {
             "sets": _sets(workspace, tuned, reported, laws, reps, touch),

@@ -41,7 +41,12 @@ class Detection:
             np.array(facts[name], dtype=np.float64) for name in ("loads_g", "hits", "tries")
         )
         return cls(
-            float(facts["snr_db"]), weights, hits, tries, int(facts["false"]), int(facts["quiet"])
+            float(facts["snr_db"]),
+            weights,
+            hits,
+            tries,
+            int(facts["false"]),
+            int(facts["untouched"]),
         )
 
     def as_dict(self) -> dict[str, Any]:
