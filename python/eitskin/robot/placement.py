@@ -1,29 +1,19 @@
 """Touches in the frame of reference of a robot's link."""
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.kinematics.pose import IDENTITY, Pose, quaternion_xyzw
-from eitskin.surface.surface_map import SurfaceMap
-
-
-class FlatTouch(Protocol):
-    """A touch in the millimetres of a skin's drawing, of a frame or after a drive."""
-
-    @property
-    def x_mm(self) -> float: ...
-    @property
-    def y_mm(self) -> float: ...
-    @property
-    def x_variance_mm2(self) -> float | None: ...
-    @property
-    def xy_covariance_mm2(self) -> float | None: ...
-    @property
-    def y_variance_mm2(self) -> float | None: ...
+from eitskin.surface.surface_map import (
+    LocatedTouch,
+    SurfaceMap,
+    covariance_in_space,
+    flat_covariance_mm2,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,32 +62,30 @@ class Placement:
     pose: Pose = IDENTITY
     surface: SurfaceMap | None = None
 
-    def place(self, touch: FlatTouch) -> PlacedTouch:
-        """``touch`` in the link's frame."""
-        if self.surface is None:
-            position_m = self.pose.points([touch.x_mm / 1e3, touch.y_mm / 1e3, 0.0])
-            return _placed(touch, position_m, self.pose.rotation, 1.0)
-        if isinstance(touch, Touch):
+    def place(self, touch: LocatedTouch) -> PlacedTouch:
+        """``touch`` in the link's frame. On a surface, the covariance includes what is not known of
+        the touch's radius (``SurfaceMap.touch``); touches after a drive have none."""
+        if self.surface is not None and isinstance(touch, Touch):
             there = self.surface.touch(touch)
-            point_m, normal, tangents = there.point_m, there.normal, there.tangents
-            scale = there.scale
-        else:  # after a drive, without a shape
-            places = self.surface.at([touch.x_mm, touch.y_mm])
-            point_m, normal, tangents = places.point_m[0], places.normal[0], places.tangents[0]
-            scale = float(places.scale[0])
-        rotation = self.pose.rotation @ np.column_stack([tangents, normal])
-        return _placed(touch, self.pose.points(point_m), rotation, scale)
-
-
-def _placed(
-    touch: FlatTouch, position_m: FloatArray, rotation: FloatArray, scale: float
-) -> PlacedTouch:
-    m_per_mm, tangents = scale / 1e3, rotation[:, :2]
-    xx, xy, yy = touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2
-    covariance = None
-    if xx is not None and xy is not None and yy is not None:
-        covariance = m_per_mm**2 * tangents @ np.array([[xx, xy], [xy, yy]]) @ tangents.T
-    velocity = None
-    if hasattr(touch, "vx_mm_per_s") and hasattr(touch, "vy_mm_per_s"):
-        velocity = m_per_mm * tangents @ np.array([touch.vx_mm_per_s, touch.vy_mm_per_s])
-    return PlacedTouch(position_m, rotation, scale, covariance, velocity)
+            point_m, tangents, normal = there.point_m, there.tangents, there.normal
+            scale, covariance = there.scale, there.covariance_m2
+        else:
+            point_m, scale = np.array([touch.x_mm / 1e3, touch.y_mm / 1e3, 0.0]), 1.0
+            tangents, normal = np.eye(3)[:, :2], np.array([0.0, 0.0, 1.0])
+            if self.surface is not None:
+                places = self.surface.at([touch.x_mm, touch.y_mm])
+                point_m, scale = places.point_m[0], float(places.scale[0])
+                tangents, normal = places.tangents[0], places.normal[0]
+            flat = flat_covariance_mm2(touch)
+            covariance = None if flat is None else covariance_in_space(flat, tangents, scale)
+        turn, velocity = self.pose.rotation, None
+        if hasattr(touch, "vx_mm_per_s") and hasattr(touch, "vy_mm_per_s"):
+            flat_velocity = np.array([touch.vx_mm_per_s, touch.vy_mm_per_s])
+            velocity = scale / 1e3 * (turn @ tangents @ flat_velocity)
+        return PlacedTouch(
+            position_m=self.pose.points(point_m),
+            rotation=turn @ np.column_stack([tangents, normal]),
+            scale=scale,
+            covariance_m2=None if covariance is None else turn @ covariance @ turn.T,
+            velocity_m_per_s=velocity,
+        )

@@ -22,9 +22,10 @@ from eitskin.device.wire.explain import status_text
 from eitskin.device.wire.link_table import DriveTouch
 from eitskin.device.wire.packets import DriveTouches, Fault, RawFrame, Solved
 from eitskin.errors import MissingExtraError
-from eitskin.robot.placement import FlatTouch, PlacedTouch, Placement
+from eitskin.robot.placement import PlacedTouch, Placement
 from eitskin.session.message import TrueTouch, frame_table, head, report_table, true_table
 from eitskin.solve.image_touches import touches_in_image
+from eitskin.surface.surface_map import LocatedTouch
 
 
 @dataclass(frozen=True)
@@ -333,7 +334,7 @@ class Frame:
 
 
 def _placed(
-    placement: Placement | None, touches: Sequence[FlatTouch]
+    placement: Placement | None, touches: Sequence[LocatedTouch]
 ) -> tuple[PlacedTouch, ...] | None:
     return None if placement is None else tuple(map(placement.place, touches))
 

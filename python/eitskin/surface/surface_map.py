@@ -8,6 +8,7 @@ them back to the surface.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,21 @@ from eitskin.surface.locate import Locator, nearest_on_segments, nearest_on_tria
 from eitskin.surface.topology import rim_loop
 
 EXPECTED_RADIUS_SD = 0.3  # of the radius that a touch is given where the data do not tell it
+
+
+class LocatedTouch(Protocol):
+    """A touch in the millimetres of a skin's drawing, of a frame or after a drive."""
+
+    @property
+    def x_mm(self) -> float: ...
+    @property
+    def y_mm(self) -> float: ...
+    @property
+    def x_variance_mm2(self) -> float | None: ...
+    @property
+    def xy_covariance_mm2(self) -> float | None: ...
+    @property
+    def y_variance_mm2(self) -> float | None: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,23 +183,13 @@ class SurfaceMap:
             shift *= 0.5 * touch.radius_mm / length
         place = self.at(centre + shift)
         tangents, scale = place.tangents[0], float(place.scale[0])
-        covariance = long_axis = None
-        if (
-            touch.x_variance_mm2 is not None
-            and touch.xy_covariance_mm2 is not None
-            and touch.y_variance_mm2 is not None
-        ):
-            flat = np.array(
-                [
-                    [touch.x_variance_mm2, touch.xy_covariance_mm2],
-                    [touch.xy_covariance_mm2, touch.y_variance_mm2],
-                ]
-            )
+        flat, covariance, long_axis = flat_covariance_mm2(touch), None, None
+        if flat is not None:
             unsure = EXPECTED_RADIUS_SD
             if touch.radius_sd_mm is not None:
                 unsure = touch.radius_sd_mm / touch.radius_mm
-            flat += np.outer(shift, shift) * (2 * unsure) ** 2
-            covariance = tangents @ flat @ tangents.T * (1e-3 * scale) ** 2
+            flat = flat + np.outer(shift, shift) * (2 * unsure) ** 2
+            covariance = covariance_in_space(flat, tangents, scale)
         if touch.long_x_mm is not None and touch.long_y_mm is not None:
             long_axis = tangents @ np.array([touch.long_x_mm, touch.long_y_mm]) * (1e-3 * scale)
         return SurfaceTouch(
@@ -280,6 +286,20 @@ class SurfaceMap:
         for k in range(3):
             np.add.at(total, self.triangles[:, k], of_triangles)
         return total
+
+
+def flat_covariance_mm2(touch: LocatedTouch) -> FloatArray | None:
+    """Return the covariance (2, 2) of a touch's place in mm^2 of the drawing; None: not known."""
+    xx, xy, yy = touch.x_variance_mm2, touch.xy_covariance_mm2, touch.y_variance_mm2
+    if xx is None or xy is None or yy is None:
+        return None
+    return np.array([[xx, xy], [xy, yy]])
+
+
+def covariance_in_space(flat_mm2: FloatArray, tangents: FloatArray, scale: float) -> FloatArray:
+    """Return the covariance (3, 3) in m^2 of a place on a surface whose place on the flattened copy
+    has the covariance ``flat_mm2`` (2, 2)."""
+    return np.asarray((1e-3 * scale) ** 2 * (tangents @ flat_mm2 @ tangents.T))
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

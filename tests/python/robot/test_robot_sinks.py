@@ -140,6 +140,9 @@ def test_a_touch_on_a_surface_is_placed_on_it_and_turned_with_its_link():
         assert np.linalg.norm(one.position_m) == pytest.approx(0.06, abs=2e-4)
         assert one.normal == pytest.approx(one.position_m / 0.06, abs=0.02)
     assert report.message()["touches"][0]["velocity_m_per_s"] is not None
-    turned = Placement("hand", from_rpy([0, 0, 1], [0, np.pi / 2, 0]), ball).place(frame.touches[0])
+    pose = from_rpy([0, 0, 1], [0, np.pi / 2, 0])
+    turned = Placement("hand", pose, ball).place(frame.touches[0])
     here = (frame.placed or ())[0].position_m
     assert turned.position_m == pytest.approx([here[2], here[1], 1 - here[0]])
+    known = ball.touch(frame.touches[0]).covariance_m2  # with what is not known of the radius
+    assert turned.covariance_m2 == pytest.approx(pose.rotation @ known @ pose.rotation.T, rel=1e-6)
