@@ -408,22 +408,33 @@ TEST(blocks_of_rows_are_the_rows)
 
 /* ---- interaction ---- */
 
-/* Where z lies mirrored in the rim: a circle about the grid's middle, or the line x = LINE. */
-static const double LINE = 13;
-static double complex mirrored(double complex z, int straight)
+/* The rim is a circle about the grid's middle, the line x = LINE, or another circle. */
+enum { CENTRED, STRAIGHT, ELSEWHERE, RIMS };
+static const double LINE = 13, OTHER_RIM = 9;
+static const double complex OTHER_MIDDLE = 5 + 8 * I;
+
+/* Where z lies mirrored in the rim. */
+static double complex mirrored(double complex z, int rim)
 {
-    const double complex middle = MIDDLE * (1 + I);
-    return straight ? 2 * LINE - conj(z) : middle + RIM * RIM / conj(z - middle);
+    const double complex middle = rim == CENTRED ? MIDDLE * (1 + I) : OTHER_MIDDLE;
+    const double radius = rim == CENTRED ? RIM : OTHER_RIM;
+    return rim == STRAIGHT ? 2 * LINE - conj(z) : middle + radius * radius / conj(z - middle);
 }
 
-/* The line's mirror in place of the circle's: b = conj(n) = 1, a = z_p + 2 d in mm. */
-static void store_line(void)
+/* The mirror of another rim in place of the circle's. The line's is b = conj(n) = 1, a = z_p + 2 d
+ * in mm; that of a circle about m is b = conj(z_p - m) / R, a = R + b m. */
+static void store_rim(int rim)
 {
     const eits_model *m = &b.c.model;
     uint8_t *halves = small_model_section(&b.made, "FLDS", NULL) + 16;
+    const double complex middle = MIDDLE * (1 + I), other = OTHER_MIDDLE - middle;
     for (uint32_t j = 0; j < m->n_pixels; ++j, halves += 2 * SMALL_FIELDS_STRIDE) {
-        const double x = m->pixel[j].ix + 0.5 - MIDDLE, y = m->pixel[j].iy + 0.5 - MIDDLE,
-                     mirror[4] = {6 * (2 * (LINE - MIDDLE) - x), 6 * y, 1, 0};
+        const double complex z = m->pixel[j].ix + 0.5 + I * (m->pixel[j].iy + 0.5) - middle,
+                             of_circle = conj(z - other) / OTHER_RIM,
+                             of = rim == STRAIGHT ? 1 : of_circle,
+                             whole = rim == STRAIGHT ? 2 * (LINE - MIDDLE) - conj(z)
+                                                     : OTHER_RIM + of_circle * other;
+        const double mirror[4] = {6 * creal(whole), 6 * cimag(whole), creal(of), cimag(of)};
         for (int k = 0; k < 4; ++k)
             small_put_u16(halves + 2 * (2 * L + k), small_half(mirror[k]));
     }
@@ -433,7 +444,7 @@ static void store_line(void)
  * for shape i's own w, by a contour. */
 static double complex expected_induced(const eits_context *ctx, const eits_shape *shape,
                                        uint32_t count, uint32_t i, uint32_t orders, uint32_t n,
-                                       uint32_t e, int straight)
+                                       uint32_t e, int rim)
 {
     enum { POINTS = 64 };
     const double complex c = (double)shape[i].x + I * (double)shape[i].y;
@@ -447,7 +458,7 @@ static double complex expected_induced(const eits_context *ctx, const eits_shape
                 const double complex sent = sent_of(ctx, j, k, e);
                 if (i != j)
                     potential += sent * cpow(z - from, -(double)k);
-                potential += conj(sent * cpow(mirrored(z, straight) - from, -(double)k));
+                potential += conj(sent * cpow(mirrored(z, rim) - from, -(double)k));
             }
         }
         sum += potential * cpow(turn * 0.3, -(double)n) / POINTS;
@@ -461,23 +472,22 @@ TEST(touches_and_images_send_what_a_contour_says)
     static const eits_shape near[] = {{R(5.1), R(6.2), R(1.3), R(1.2), 0, 0},
                                       {R(8.1), R(7.4), R(1.2), R(1.5), R(0.2), R(-0.15)},
                                       {R(6.9), R(4.1), R(1.2), R(-0.9), R(-0.1), R(0.2)}};
-    for (int straight = 0; straight < 2; ++straight) {
+    for (int rim = CENTRED; rim < RIMS; ++rim) {
         for (uint32_t count = 1; count <= 3; count += 2) {
             eits_context *ctx = dense_bench_open(&b, ROUND, 0);
-            if (straight)
-                store_line();
+            if (rim != CENTRED)
+                store_rim(rim);
             settle(ctx, near, count, &ELLIPSES, 1);
             for (uint32_t i = 0; i < count; ++i) {
                 for (uint32_t n = 1; n <= ELLIPSES.orders + 1; ++n) {
                     double off = 0, size = 0;
                     for (uint32_t e = 0; e < L; ++e) {
                         const double complex expected =
-                            expected_induced(ctx, near, count, i, ELLIPSES.sent, n, e, straight);
+                            expected_induced(ctx, near, count, i, ELLIPSES.sent, n, e, rim);
                         size += pow(cabs(expected), 2);
                         off += pow(cabs(term_of(induced_of(ctx, i), n, e) - expected), 2);
                     }
-                    checks_number =
-                        (long)(1000 * straight + 100 * (int)count + 10 * (int)i + (int)n);
+                    checks_number = (long)(1000 * rim + 100 * (int)count + 10 * (int)i + (int)n);
                     CHECK(size > 0);
                     CHECK_NEAR(sqrt(off / size), 0, 0.004);
                 }

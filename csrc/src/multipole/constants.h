@@ -27,9 +27,14 @@
  * kept [relative]. larger: drops terms that tell something; smaller: keeps rounding */
 #define EITS_POLE_DEPENDENT R(1e-05)
 
-/* |b|^2 of a mirror from which on the rim counts as straight and not as a circle. touches never lie
- * so near a circle's rim that |b|^2 is above it */
-#define EITS_POLE_STRAIGHT R(0.9999)
+/* a mirror whose circle has its middle this near the origin, times |b|, is that of a round skin
+ * [pixels]. larger: other outlines get the circle of a round skin; smaller: rounding of the stored
+ * b of a large grid passes it */
+#define EITS_POLE_CENTRED R(0.05)
+
+/* nearer to the rim, it counts as straight [pixels]. larger: the rim's curvature is lost; smaller:
+ * it is rounding of the stored mirror */
+#define EITS_POLE_DEPTH R(0.05)
 
 /* touches further apart meet as dipoles [sums of radii]. larger: costs; smaller: answers of near
  * touches err by more than .3 % */

@@ -5,11 +5,12 @@
  *
  *     (t + s)^-k = sum_q t^(-k-q) binomial(-k, q) s^q,    t = c_i - c_j
  *
- * The rim, which no current crosses, mirrors each source: conj(B_k) h(z)^k. For a circle of radius
- * R h = z / (R^2 - conj(c_j) z). For another outline the nearest piece of the rim counts as
- * straight, which the model stores as a and b of D = a - b z (docs/reference/eitm-format.md,
- * "FLDS"); then h = 1 / (b D). Both have h_q = b^(q-1) / D^(q+1) for q > 0. A shape meets its own
- * image, too. Rounds: in each, every shape sends what the field of the round before makes it send.
+ * The rim, which no current crosses, mirrors each source: conj(B_k) h(z)^k. The model stores a and
+ * b of D = a - b z (docs/reference/eitm-format.md, "FLDS"), which make a circle of radius R through
+ * which the rim passes near the source. With 1 / R = (1 - |b|^2) / (a - b c_j), 0 where the rim is
+ * straight, h = (conj(b) + (z - c_j) / R) / D. For a round skin the circle is the rim, and h = z /
+ * (R D). All have h_q = b^(q-1) / D^(q+1) for q > 0. A shape meets its own image, too. Rounds: in
+ * each, every shape sends what the field of the round before makes it send.
  */
 #include "base/vec.h"
 #include "multipole/constants.h"
@@ -49,9 +50,8 @@ static void send(const eits_form *f, const eits_real *mode, uint32_t sent, uint3
 /* The rim's mirror of a source in slot j, in pixels. */
 typedef struct mirror {
     eits_complex a, b;
-    eits_complex origin; /* of the model's coordinates, from the grid's lower left corner */
-    eits_complex whole;  /* a in the model's coordinates */
-    int straight;
+    eits_complex middle; /* h_0 D = offset + (z - middle) times per_radius */
+    eits_complex offset, per_radius;
 } mirror;
 
 static mirror mirror_of(const eits_context *ctx, uint32_t j, const eits_shape *shape)
@@ -59,25 +59,40 @@ static mirror mirror_of(const eits_context *ctx, uint32_t j, const eits_shape *s
     const eits_model *model = ctx->model;
     const eits_real pixel = (eits_real)model->pixel_mm, *stored = ctx->multipole.mirror[j];
     const eits_pixel at = model->pixel[ctx->multipole.home_pixel[j]];
+    const eits_complex home = {(eits_real)at.ix + R(0.5), (eits_real)at.iy + R(0.5)};
     /* the mirror was stored for the home pixel's middle */
     const eits_complex moved = {shape->x - (eits_real)at.ix - R(0.5),
                                 shape->y - (eits_real)at.iy - R(0.5)};
-    mirror m = {.whole = {stored[0] / pixel, stored[1] / pixel},
-                .b = {stored[2], stored[3]},
-                .origin = {-((eits_real)model->origin_x_mm / pixel),
-                           -((eits_real)model->origin_y_mm / pixel)}};
-    m.straight = eits_fma(m.b.re, m.b.re, m.b.im * m.b.im) > EITS_POLE_STRAIGHT;
-    if (m.straight) {
-        const eits_complex by = eits_times(eits_conjugate(m.b), eits_conjugate(moved));
-        m.whole.re -= by.re;
-        m.whole.im -= by.im;
-    } else {
-        const eits_complex by = eits_times(eits_conjugate(moved), eits_inverse(m.whole));
+    eits_complex whole = {stored[0] / pixel, stored[1] / pixel}; /* a in the model's coordinates */
+    const eits_complex origin = {-((eits_real)model->origin_x_mm / pixel),
+                                 -((eits_real)model->origin_y_mm / pixel)};
+    mirror m = {.b = {stored[2], stored[3]}};
+    const eits_complex c = {home.re - origin.re, home.im - origin.im}, bc = eits_times(m.b, c),
+                       back = eits_times(eits_conjugate(m.b), whole);
+    const eits_real away_re = back.re - c.re, away_im = back.im - c.im, depth = whole.re - bc.re;
+    if (eits_fma(away_re, away_re, away_im * away_im) < EITS_POLE_CENTRED * EITS_POLE_CENTRED &&
+        depth > EITS_POLE_DEPTH) { /* the circle's middle is the origin: a round skin */
+        const eits_complex by = eits_times(eits_conjugate(moved), eits_inverse(whole));
+        m.middle = origin;
+        m.per_radius = eits_inverse(whole);
         m.b.re += by.re;
         m.b.im += by.im;
+    } else {
+        const eits_real square = eits_fma(m.b.re, m.b.re, m.b.im * m.b.im),
+                        per_radius = depth > EITS_POLE_DEPTH ? (1 - square) / depth : 0;
+        m.middle = home;
+        m.offset = eits_conjugate(m.b);
+        m.per_radius.re = per_radius;
+        const eits_complex by =
+            eits_times(eits_conjugate(moved), (eits_complex){m.offset.re - per_radius * c.re,
+                                                             m.offset.im - per_radius * c.im});
+        whole.re -= by.re;
+        whole.im -= by.im;
+        m.b.re = eits_fma(per_radius, moved.re, m.b.re);
+        m.b.im = eits_fma(per_radius, -moved.im, m.b.im);
     }
-    const eits_complex part = eits_times(m.b, m.origin); /* z = z_grid - origin */
-    m.a = (eits_complex){m.whole.re + part.re, m.whole.im + part.im};
+    const eits_complex part = eits_times(m.b, origin); /* z = z_grid - origin */
+    m.a = (eits_complex){whole.re + part.re, whole.im + part.im};
     return m;
 }
 
@@ -86,12 +101,10 @@ static void mirror_series(const mirror *m, eits_complex at, uint32_t terms, eits
 {
     const eits_complex bz = eits_times(m->b, at),
                        d = eits_inverse((eits_complex){m->a.re - bz.re, m->a.im - bz.im});
-    if (m->straight) {
-        h[0] = eits_times(d, eits_inverse(m->b));
-    } else {
-        const eits_complex z = {at.re - m->origin.re, at.im - m->origin.im};
-        h[0] = eits_times(eits_times(z, d), eits_inverse(m->whole));
-    }
+    const eits_complex z = {at.re - m->middle.re, at.im - m->middle.im},
+                       bent = eits_times(eits_times(z, d), m->per_radius),
+                       flat = eits_times(m->offset, d);
+    h[0] = (eits_complex){flat.re + bent.re, flat.im + bent.im};
     eits_complex next = eits_times(d, d);
     const eits_complex ratio = eits_times(m->b, d);
     for (uint32_t q = 1; q <= terms; ++q) {

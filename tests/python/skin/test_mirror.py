@@ -1,5 +1,7 @@
 """The rim's mirror of a dipole."""
 
+from math import gamma
+
 import numpy as np
 import pytest
 
@@ -29,15 +31,43 @@ def test_no_current_crosses_the_rim_of_a_disk(dipole):
     assert np.abs(along).max() < 1e-12 * np.abs(seen).max()
 
 
+def test_many_corners_are_a_disk():
+    turn = 2 * np.pi * np.arange(200) / 200
+    circle = polygon(40 * np.column_stack([np.cos(turn), np.sin(turn)]))
+    points = [(0.0, 0.0), (10.0, -20.0), (-31.0, 12.0), (0.0, 38.0)]
+    ours, exact = rim_mirror(circle, points), rim_mirror(disk(80.0), points)
+    assert ours[0] == pytest.approx(exact[0], abs=0.02)
+    assert ours[1] == pytest.approx(exact[1], abs=1e-3)
+
+
+def test_the_middle_of_a_square_has_its_conformal_radius():
+    """A square of side 1 has the conformal radius 4 sqrt(pi) / Gamma(1/4)^2 at its middle (Polya
+    and Szego, Isoperimetric inequalities in mathematical physics, 1951)."""
+    square = polygon([(0, 0), (100, 0), (100, 100), (0, 100)])
+    (a,), (b,) = rim_mirror(square, [(50.0, 50.0)])
+    assert a == pytest.approx(100 * 4 * np.sqrt(np.pi) / gamma(0.25) ** 2, rel=1e-4)
+    assert b == pytest.approx(0, abs=1e-9)
+
+
 @pytest.mark.parametrize("dipole", [1.0, 1j, 0.6 - 0.8j])
 def test_no_current_crosses_a_straight_edge(dipole):
-    """The upper edge of a rectangle, 7 mm away: the mirror image lies as far beyond."""
+    """The upper edge of a rectangle, .2 mm away: the mirror image lies as far beyond."""
+    rectangle = polygon([(0, 0), (100, 0), (100, 50), (0, 50)])
+    (a,), (b,) = rim_mirror(rectangle, [(40.0, 49.8)])
+    assert b == pytest.approx(-1j) and a == pytest.approx(-1j * (40 + 50.2j))
+    edge = np.linspace(0, 100, 50) + 50j
+    seen = field(40 + 49.8j, dipole, a, b, edge)
+    assert np.abs(seen.imag).max() < 1e-12 * np.abs(seen).max()
+
+
+def test_little_current_crosses_the_edge_next_to_a_place():
+    """7 mm from the upper edge of a rectangle, the other edges change the mirror a little."""
     rectangle = polygon([(0, 0), (100, 0), (100, 50), (0, 50)])
     (a,), (b,) = rim_mirror(rectangle, [(40.0, 43.0)])
-    assert b == pytest.approx(-1j) and a == pytest.approx(-1j * (40 + 57j))
-    edge = np.linspace(0, 100, 50) + 50j
-    seen = field(40 + 43j, dipole, a, b, edge)
-    assert np.abs(seen.imag).max() < 1e-12 * np.abs(seen).max()
+    near = np.linspace(30, 50, 21) + 50j
+    for dipole in (1.0, 1j):
+        seen = field(40 + 43j, dipole, a, b, near)
+        assert np.abs(seen.imag).max() < 0.02 * np.abs(seen).max()
 
 
 OUTLINES = {
@@ -48,23 +78,23 @@ OUTLINES = {
 
 
 @pytest.mark.parametrize("outline", OUTLINES.values(), ids=OUTLINES)
-def test_a_straight_mirror_is_the_image_beyond_the_nearest_edge(outline):
-    """a / b is the image point, |b| = 1; on the rim it is the point itself, from within as on it
-    and beyond."""
+def test_the_mirror_is_that_of_a_disk_around_the_place(outline):
+    """a - b z is the conformal radius: at least the distance to the rim, and at most four times
+    (Koebe). |b| is at most 1 where the outline is convex, at most 2 elsewhere. On the rim, the image
+    is the point itself, from within as on it and beyond."""
     low, high = np.min(outline.vertices_mm, axis=0), np.max(outline.vertices_mm, axis=0)
     points = low + (high - low) * np.random.default_rng(4).random((200, 2))
     points = points[outline.contains(points)]
     a, b = rim_mirror(outline, points)
-    place, image = points[:, 0] + 1j * points[:, 1], a / b
-    assert np.abs(b) == pytest.approx(1)
-    middle = (place + image) / 2
+    place = points[:, 0] + 1j * points[:, 1]
+    radius = a - b * place
     corners = np.asarray(outline.vertices_mm) @ [1, 1j]
     along = np.roll(corners, -1) - corners
-    share = np.clip(((middle[:, None] - corners) * np.conj(along)).real / np.abs(along) ** 2, 0, 1)
-    assert np.abs(middle[:, None] - corners - share * along).min(axis=1) == pytest.approx(
-        0, abs=1e-9
-    )  # halfway lies the rim
-    assert (image - place) * b == pytest.approx(np.abs(image - place))  # straight outward
+    share = ((place[:, None] - corners) * np.conj(along)).real / np.abs(along) ** 2
+    away = np.abs(place[:, None] - corners - np.clip(share, 0, 1) * along).min(axis=1)
+    assert radius.imag == pytest.approx(0, abs=1e-9)
+    assert (radius.real >= 0.98 * away).all() and (radius.real <= 4 * away).all()
+    assert np.abs(b).max() <= (2 if outline is OUTLINES["l"] else 1 + 1e-3)
     for edge in range(len(corners)):
         on, outward = corners[edge] + along[edge] / 2, -1j * along[edge] / abs(along[edge])
         near = [on + step * outward for step in (-1e-6, 0.0, 1e-6)]
