@@ -16,8 +16,9 @@ from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.config import from_table
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
+from eitskin.fem.mesh import lifted
 from eitskin.scene.cover import NO_CHANGE, Change, Cover
-from eitskin.scene.deformation import FLAT, Deformation, one_after_another
+from eitskin.scene.deformation import FLAT, Deformation, Flexed, one_after_another
 from eitskin.scene.description import Scene
 from eitskin.scene.effect import (
     Contacts,
@@ -54,7 +55,7 @@ class State:
     change: Change
     contacts: Contacts
     frame: int
-    deformation: Deformation = FLAT
+    deformation: Deformation | Flexed = FLAT
 
 
 class States:
@@ -66,7 +67,8 @@ class States:
         self._varying = [s for s in steps if isinstance(s, MaterialStep) and s.varies]
         self._deforming = [s for s in steps if isinstance(s, DeformationStep)]
         self._contacts = _contacts(scene, steps, frames)
-        self._changes: dict[tuple[tuple[TrueTouch, ...], Deformation], Change] = {}
+        self._changes: dict[tuple[tuple[TrueTouch, ...], Deformation | Flexed], Change] = {}
+        self._flexed: tuple[Flexed, Cover] | None = None
         self._number: dict[Any, int] = {}
         self.all: list[State] = []
         self.motion = Motion(scene.touches, size_to_paper(scene.skin.outline))
@@ -91,19 +93,26 @@ class States:
         """Return state ``number`` with ``fingers`` beside its touches. It gets no number, and
         nothing of it is kept."""
         state = self.all[number]
-        touches, flat = state.touches + fingers, state.deformation == FLAT
-        matrix = None if flat else state.deformation.matrix
-        return replace(state, touches=touches, change=self._cover.change(touches, matrix))
+        touches = state.touches + fingers
+        return replace(state, touches=touches, change=self._covered(touches, state.deformation))
 
-    def change(self, touches: tuple[TrueTouch, ...], deformation: Deformation = FLAT) -> Change:
+    def change(
+        self, touches: tuple[TrueTouch, ...], deformation: Deformation | Flexed = FLAT
+    ) -> Change:
         """Return how ``touches`` change the conductivity of the deformed skin."""
         if not touches:
             return NO_CHANGE
         key = touches, deformation
         if key not in self._changes:
-            matrix = None if deformation == FLAT else deformation.matrix
-            self._changes[key] = self._cover.change(touches, matrix)
+            self._changes[key] = self._covered(touches, deformation)
         return self._changes[key]
+
+    def _covered(self, touches: tuple[TrueTouch, ...], how: Deformation | Flexed) -> Change:
+        if not isinstance(how, Flexed):
+            return self._cover.change(touches, None if how == FLAT else how.matrix)
+        if self._flexed is None or self._flexed[0] is not how:
+            self._flexed = how, Cover(lifted(self._cover.mesh, how.surface))
+        return self._flexed[1].change(touches)
 
     def mix(self, frame: int, times_s: FloatArray) -> Mix:
         """Return the states of ``frame``'s rows at their instants (m,)."""
@@ -317,13 +326,13 @@ def _refuse_flat_effects(scene: Scene, skin: Skin, steps: Sequence[Step]) -> Non
     """Reject effects that move the outline of a skin whose outline belongs to a surface."""
     if skin.surface is None:
         return
-    names = [step.name for step in steps if isinstance(step, DeformationStep)]
+    names = [s.name for s in steps if isinstance(s, DeformationStep) and not s.of_surfaces]
     if skin.outline != scene.skin.outline:
         names += [step.name for step in steps if isinstance(step, GeometryStep)]
     if names:
         raise ConfigError(
             f"{scene.where} [effects.{names[0]}]: this effect is for flat skins, and"
-            f" {skin.name!r} covers a surface; describe the deformed surface by another mesh"
+            f" {skin.name!r} covers a surface; [effects.flex] gives it another shape"
         )
 
 

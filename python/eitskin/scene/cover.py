@@ -64,7 +64,7 @@ class Cover:
     """
 
     def __init__(self, mesh: Mesh, subdivision: int = SUBDIVISION) -> None:
-        self._weights = centres_of_parts(subdivision)
+        self.mesh, self._weights = mesh, centres_of_parts(subdivision)
         self._chart: PlaneChart | SurfaceChart = (
             PlaneChart(mesh) if mesh.surface is None else SurfaceChart(mesh, mesh.surface)
         )

@@ -71,6 +71,7 @@ class Scene:
         where: the file, for errors.
         dataset: the table [dataset], as in TOML.
         text: the TOML that the scene was read from.
+        folder: where files that effects name are searched.
 
     Raises:
         ConfigError: a number is out of range, or a touch lies outside the skin, overlaps another or
@@ -95,6 +96,7 @@ class Scene:
     skin_file: Path | None = None
     dataset: Mapping[str, Any] = field(default_factory=dict)
     text: str = ""
+    folder: Path = Path()
 
     def __post_init__(self) -> None:
         place, numbers = f"{self.where} [scene]", {"seed": self.seed, "frames": self.frames}
@@ -216,6 +218,7 @@ def scene_from_table(table: Mapping[str, Any], where: str, folder: Path, text: s
         skin_file=skin_file,
         dataset=subtable(table, "dataset", where),
         text=text,
+        folder=folder,
         **given,
     )
 

@@ -28,6 +28,7 @@ values that are random once are drawn in ``make`` from ``session.stream(NAME)`` 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import IntEnum
+from pathlib import Path
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -38,7 +39,7 @@ from eitskin.arrays import ComplexArray as ComplexArray
 from eitskin.arrays import FloatArray as FloatArray
 from eitskin.errors import ConfigError
 from eitskin.fem.mesh import Mesh
-from eitskin.scene.deformation import Deformation
+from eitskin.scene.deformation import Deformation, Flexed
 from eitskin.skin.protocol import Protocol as ScanProtocol
 from eitskin.skin.skin import Skin
 
@@ -84,6 +85,7 @@ class EffectSession:
         quiet_frames: the number of untouched frames, at the start.
         rate_hz: frames per second.
         seed: the seed of the scene.
+        folder: where the scene's file lies, in which an effect's files are searched.
         build_mesh: use ``mesh`` instead.
         solve_v0: use ``v0_v`` instead.
         make_stream: use ``stream`` instead.
@@ -98,6 +100,7 @@ class EffectSession:
     build_mesh: Callable[[], Mesh]
     solve_v0: Callable[[], FloatArray]
     make_stream: Callable[[str, int], np.random.Generator]
+    folder: Path = Path()
 
     @property
     def mesh(self) -> Mesh:
@@ -211,15 +214,17 @@ class MaterialStep:
 
 @dataclass(frozen=True, eq=False)
 class DeformationStep:
-    """``apply(time_s, frame) -> Deformation`` deforms skin and electrodes; several steps are
-    applied in turn. Frames with equal deformations share a solve."""
+    """``apply(time_s, frame)`` deforms skin and electrodes: ``Deformation`` a flat skin, where
+    several steps are applied in turn, and ``Flexed`` one that covers a surface. Frames with equal
+    deformations share a solve."""
 
     name: str
     cost: EffectCost
     note: str
-    apply: Callable[[float, int], Deformation]
+    apply: Callable[[float, int], Deformation | Flexed]
     varies: bool = True
     stage: Stage = Stage.MATERIAL
+    of_surfaces: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,7 @@ BUILT_IN: dict[str, str] = {
         "misplacement",
         "stretch",
         "bend",
+        "flex",
         "creep",
         "gel_drying",
         "temperature",

@@ -13,7 +13,7 @@ from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
 from eitskin.progress import Progress, silent
 from eitskin.scene.compiler import Compiled, State, background_of, compile_scene, used_in
-from eitskin.scene.deformation import FLAT, Deformation, deformed
+from eitskin.scene.deformation import FLAT, Deformation, Flexed, deformed, thickness_of
 from eitskin.scene.description import Scene
 from eitskin.scene.forward_steps import Factorise, FactoriseComplex, Forward, Update, Work
 from eitskin.scene.motion import Mix
@@ -53,7 +53,7 @@ class FrameMaker:
     def __init__(self, compiled: Compiled) -> None:
         self.compiled, self.work = compiled, Work()
         self._forward, self._background = forward_of(compiled, self.work), background_of(compiled)
-        self._last: tuple[Deformation, Forward] | None = None
+        self._last: tuple[Deformation | Flexed, Forward, FloatArray, FloatArray] | None = None
         self._read = _reader(compiled)
         self._times = compiled.times_s()
         states = compiled.states
@@ -68,22 +68,21 @@ class FrameMaker:
         return self._readings[number]
 
     def _solved(self, state: State) -> TrueVoltages:
-        forward, thickness = self._forward, state.deformation.thickness
+        background, impedance = self._background(state), solved_impedance(state.contacts)
+        forward = self._forward
         if state.deformation != FLAT:
-            forward = self._deformed(state.deformation)
-        solved = forward.electrodes(
-            self._background(state) * thickness,
-            state.change,
-            solved_impedance(state.contacts) / thickness,
-        )
-        return self._read(solved, state)
+            forward, elements, contacts = self._deformed(state.deformation)
+            background, impedance = background * elements, impedance / contacts
+        return self._read(forward.electrodes(background, state.change, impedance), state)
 
-    def _deformed(self, how: Deformation) -> Forward:
-        """Return the forward step of a deformed skin; the last one is kept."""
+    def _deformed(self, how: Deformation | Flexed) -> tuple[Forward, FloatArray, FloatArray]:
+        """Return the forward step of a deformed skin, and the thickness of its elements and under
+        its electrodes; the last ones are kept."""
         if self._last is None or self._last[0] != how:
             model = deformed(self.compiled.model, how)
-            self._last = how, forward_of(replace(self.compiled, model=model), self.work)
-        return self._last[1]
+            forward = forward_of(replace(self.compiled, model=model), self.work)
+            self._last = how, forward, *thickness_of(self.compiled.model.mesh, how)
+        return self._last[1:]
 
     def frame(self, frame: int, row_times_s: FloatArray | None = None) -> FloatArray:
         """Return frame number ``frame`` of all frames, untouched ones first, (m,) in V. Its rows

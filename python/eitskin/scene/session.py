@@ -148,6 +148,7 @@ def make_steps(
         build_mesh=build_mesh,
         solve_v0=lambda: mesh_cache.v0_v(scene, work),
         make_stream=make_stream,
+        folder=scene.folder,
     )
     steps: list[Step] = []
     for name, module in modules.items():

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +102,9 @@ SHAPES = {
     "saddle": Shape(_saddle, True, 160.0, "a saddle, 160 mm across"),
     "fingertip": Shape(_fingertip, False, 28.0, "the pad of a finger, 28 by 28 mm"),
     "forearm": Shape(_forearm, False, 210.0, "a sleeve around a forearm, 200 mm long"),
+    "flexed_forearm": Shape(
+        partial(_forearm, bulge_mm=12.0), False, 210.0, "the same forearm with a muscle that bulges"
+    ),
 }
 
 

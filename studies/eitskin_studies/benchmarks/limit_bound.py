@@ -13,6 +13,7 @@ Frames and slopes are exact (``eitskin.oracle.round_skin``): a mesh of 12,000 el
 bound 20 % too small.
 """
 
+import typing
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -103,12 +104,20 @@ def exact_scene(
     )
 
 
-def touch_slopes_v(model: RoundSkin, touches: Sequence[TrueTouch]) -> FloatArray:
+class SolvedSkin(typing.Protocol):
+    """A skin whose voltages (m,) with touches can be calculated."""
+
+    def voltages(self, touches: Sequence[TrueTouch]) -> FloatArray: ...
+
+
+def touch_slopes_v(
+    model: SolvedSkin, touches: Sequence[TrueTouch], steps: Sequence[float] = STEPS
+) -> FloatArray:
     """Return the derivatives (p, m) of the voltages by all parameters of one touch after the other,
-    by central differences."""
+    by central differences with ``steps``."""
     slopes = [
         (model.voltages(ahead) - model.voltages(back)) / (2 * step)
-        for ahead, back, step in _neighbours(touches)
+        for ahead, back, step in _neighbours(touches, steps)
     ]
     return np.array(slopes)
 
@@ -152,13 +161,13 @@ def bounds_of(
 
 
 def _neighbours(
-    touches: Sequence[TrueTouch],
+    touches: Sequence[TrueTouch], steps: Sequence[float]
 ) -> Iterator[tuple[tuple[TrueTouch, ...], tuple[TrueTouch, ...], float]]:
     """Yield, for each parameter of each touch, the scene one step ahead, one step back, and the
     step."""
     for k, touch in enumerate(touches):
         for parameter in range(_parameter_count(touch)):
-            step = STEPS[parameter]
+            step = steps[parameter]
             ahead, back = (
                 (*touches[:k], _moved(touch, parameter, by), *touches[k + 1 :])
                 for by in (step, -step)

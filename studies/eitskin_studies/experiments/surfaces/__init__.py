@@ -27,7 +27,9 @@ from eitskin_studies.experiments.surfaces.scenes import (
     ELECTRODES,
     MODEL_TRIANGLES,
     SCENE_TRIANGLES,
+    SolvedSurface,
     SpaceTouch,
+    bounds_mm,
     draw_touches,
     flat_map,
     on_copy,
@@ -55,6 +57,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     steps: list[tuple[str, Any]] = [("flat disk", partial(_flat, workspace))]
     steps += [(name, partial(_unrolled, workspace, name)) for name in UNROLLED]
     steps += [(name, partial(_curved, workspace, name)) for name in CURVED]
+    steps += [("flat forearm", partial(_flat_forearm, workspace))]
     steps += [("flexed", partial(_flexed, workspace))]
     count = workspace.settings.count(USUAL)
     scores: dict[str, Any] = {}
@@ -94,13 +97,18 @@ def _contacts(workspace: Workspace, skin: Skin) -> FloatArray:
     return np.asarray(impedance * (1 + Measurement.contact_spread * spread))
 
 
+def _converter(tare_v: FloatArray) -> tuple[float, float]:
+    """The step and the span of the converter in V."""
+    how = converter_for(SNR_DB)
+    span_v = how.adc_headroom * float(np.abs(tare_v).max())
+    return 2 * span_v / 2 ** (how.adc_bits or 12), span_v
+
+
 def _found(
     finder: Reconstructor, volts: dict[str, FloatArray], tare_v: FloatArray, seed: int
 ) -> list[tuple[Touch, ...]]:
     """The touches of each frame, measured with noise and converter."""
-    how = converter_for(SNR_DB)
-    span_v = how.adc_headroom * float(np.abs(tare_v).max())
-    lsb_v = 2 * span_v / 2 ** (how.adc_bits or 12)
+    lsb_v, span_v = _converter(tare_v)
     converter = (noise_deviation_v(tare_v, SNR_DB), lsb_v, span_v, seed)
     finder.set_options(noise_floor_v=lsb_v / 12**0.5)
     finder.tare(measure(np.tile(tare_v, (64, 1)), *converter, "quiet surfaces")[0])
@@ -154,9 +162,23 @@ def _scored(
 
 
 def _flat(workspace: Workspace) -> dict[str, Any]:
-    surface = flat_map(shape_map("cylinder", MODEL_TRIANGLES))
-    skin = replace(skin_on("flat disk", surface), surface=None)
-    return _judged(workspace, skin, surface, skin, surface)
+    surface = shape_map("cylinder", MODEL_TRIANGLES)
+    skin, plane = _unwrapped("flat disk", skin_on("cylinder", surface)), flat_map(surface)
+    return _judged(workspace, skin, plane, skin, plane)
+
+
+def _flat_forearm(workspace: Workspace) -> dict[str, Any]:
+    """A flat skin with the outline of the forearm's copy."""
+    surface, fine = (shape_map("forearm", one) for one in (MODEL_TRIANGLES, SCENE_TRIANGLES))
+    skin = skin_on("forearm", surface)
+    true_skin = _unwrapped("flat forearm", same_on("forearm", fine, skin))
+    own = _unwrapped("flat forearm", skin)
+    return _judged(workspace, own, flat_map(surface), true_skin, flat_map(fine))
+
+
+def _unwrapped(name: str, skin: Skin) -> Skin:
+    """The flattened copy of ``skin`` as a flat skin."""
+    return replace(skin, name=name, surface=None)
 
 
 def _curved(workspace: Workspace, name: str) -> dict[str, Any]:
@@ -171,24 +193,35 @@ def _judged(
     settings = workspace.settings
     drawn = draw_touches(fine, settings.seed, "surfaces", settings.count(USUAL))
     scenes = [on_copy(fine, one) for one in drawn]
-    volts = solved(true_skin, PROTOCOL, _contacts(workspace, skin), scenes)
-    found = _found(_model(workspace, skin), volts, volts["quiet"], settings.seed)
-    return _scored(drawn, found, surface)
+    model = SolvedSurface(true_skin, PROTOCOL, _contacts(workspace, skin))
+    quiet, frames = model.voltages(()), np.array([model.voltages(one) for one in scenes])
+    found = _found(
+        _model(workspace, skin), {"quiet": quiet, "frames": frames}, quiet, settings.seed
+    )
+    sigma_v = float(np.hypot(noise_deviation_v(quiet, SNR_DB), _converter(quiet)[0] / 12**0.5))
+    places = [(one.x_mm, one.y_mm) for scene in scenes for one in scene]
+    return _scored(drawn, found, surface) | {
+        "bound_mm": bounds_mm(model, fine, scenes, sigma_v),
+        "true_scales": fine.at(places).scale.tolist(),
+    }
 
 
 def _unrolled(workspace: Workspace, name: str) -> dict[str, Any]:
-    """The same touches on the flat disk and wrapped: places and counts are compared one by one."""
+    """The same touches on the flat copy and wrapped: places and counts are compared one by one.
+    Both have the same outline and electrodes, so their meshes differ by the wrapping alone."""
     settings, score = workspace.settings, _curved(workspace, name)
     surface, fine = shape_map(name, MODEL_TRIANGLES), shape_map(name, SCENE_TRIANGLES)
     skin = skin_on(name, surface)
-    flat_skin = replace(skin_on("flat disk", flat_map(surface)), surface=None)
+    true_skin = same_on(name, fine, skin)
+    flat_name = "flat disk" if name == "cylinder" else f"flat {name}"
     drawn = draw_touches(flat_map(fine), settings.seed, "unrolled", settings.count(USUAL))
     scenes = [on_copy(flat_map(fine), one) for one in drawn]
     contacts = _contacts(workspace, skin)
     both = []
-    for model_skin, true_skin in ((skin, same_on(name, fine, skin)), (flat_skin, flat_skin)):
-        volts = solved(true_skin, PROTOCOL, contacts, scenes)
-        finder = _model(workspace, model_skin)
+    for wrapped in (True, False):
+        own, true = (one if wrapped else _unwrapped(flat_name, one) for one in (skin, true_skin))
+        volts = solved(true, PROTOCOL, contacts, scenes)
+        finder = _model(workspace, own)
         both.append((volts, _found(finder, volts, volts["quiet"], settings.seed)))
     (curved_v, curved), (flat_v, flat) = both
     moved = [
@@ -264,34 +297,40 @@ def _mm(value: float | None) -> str:
 
 
 def _table(scores: dict[str, Any]) -> Table:
-    flat = scores["flat disk"]["median_mm"]
+    flat = scores["flat disk"]
+    flat_bound = float(np.median(flat["bound_mm"]))
     rows = []
     for name, one in scores.items():
         low, high = one["scale"]
-        per_size = one["median_mm"] / one["size"]
+        per_size = one["median_mm"] / one["size"] / flat["median_mm"]
+        bound = float(np.median(one["bound_mm"]))
         rows.append(
             (
                 name, f"{194 * one['size']:.0f}", f"{low:.2f} to {high:.2f}", _percent(one),
-                _mm(one["median_mm"]), _mm(one["p95_mm"]), f"{per_size / flat:.2f}",
+                _mm(one["median_mm"]), _mm(one["p95_mm"]), f"{per_size:.2f}",
+                f"{bound:.2f}", f"{bound / one['size'] / flat_bound:.2f}",
                 f"{100 * one['within_90']:.0f} %" if one["within_90"] is not None else "-",
                 f"{one['same_count']} of {one['scenes']}, {one['moved_median_mm']:.3f}"
                 f" ({one['moved_p95_mm']:.3f}) mm" if "same_count" in one else "",
             )
         )  # fmt: skip
     head = ("surface", "size, mm", "scale", "exact (95 %)", "median, mm", "p95, mm",
-            "median over size, to the flat disk's", "within the 90 % ellipse",
+            "median over size, to the flat disk's", "bound, mm",
+            "bound over size, to the flat disk's", "within the 90 % ellipse",
             "same count as flat, places moved: median (p95)")  # fmt: skip
     return Table("scores", head, tuple(rows))
 
 
 def _zones(score: dict[str, Any]) -> Table:
     far, scales = np.array(score["far_mm"]), np.array(score["scales"])
+    bound, true_scales = np.array(score["bound_mm"]), np.array(score["true_scales"])
     rows = []
     for low, high in ((1.0, 1.3), (1.3, 1.6), (1.6, 2.1)):
         own = far[(scales >= low) & (scales < high)]
-        rows.append((f"{low:g} to {min(high, 2.0):g}", str(len(own)),
-                     _mm(float(np.median(own)) if len(own) else None)))  # fmt: skip
-    return Table("zones", ("scale", "touches", "median, mm"), tuple(rows))
+        least = bound[(true_scales >= low) & (true_scales < high)]
+        medians = [_mm(float(np.median(one)) if len(one) else None) for one in (own, least)]
+        rows.append((f"{low:g} to {min(high, 2.0):g}", str(len(own)), *medians))
+    return Table("zones", ("scale", "touches", "median, mm", "bound, mm"), tuple(rows))
 
 
 def _caps(caps: list[dict[str, Any]]) -> Table:

@@ -1,5 +1,6 @@
 """Skins and scenes on surfaces: a model's mesh and the scenes' mesh are two triangulations."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +18,14 @@ from eitskin.skin.skin import Skin, outline_on
 from eitskin.surface.outline import surface_map
 from eitskin.surface.shapes import make_shape
 from eitskin.surface.surface_map import SurfaceMap
+from eitskin_studies.benchmarks.limit_bound import bounds_of, touch_slopes_v
 from eitskin_studies.experiments.experiment import SIMULATED_ELEMENTS
 
 MODEL_TRIANGLES, SCENE_TRIANGLES = 4000, 16_000
 ELECTRODES = 16
 TRIES = 4000
+# x and y in mm of the flat skin of 194 mm, log radius and amplitude
+BOUND_STEPS = (0.6, 0.6, 0.067, 0.02)
 # of the flat skin of 194 mm, scaled to the skin's size
 RADIUS_MM, GAP_MM, MARGIN_MM, CONTRAST, WIDTH_MM = (6.0, 12.0), 12.0, 4.0, (3.0, 10.0), 4.0
 
@@ -110,6 +114,28 @@ def on_copy(surface: SurfaceMap, touches: list[SpaceTouch]) -> tuple[TrueTouch, 
     )
 
 
+class SolvedSurface:
+    """The voltages of a skin on a surface, by finite elements on one mesh."""
+
+    def __init__(self, skin: Skin, protocol: Protocol, contact_ohm_m2: FloatArray) -> None:
+        mesh = mesh_for_elements(skin, SIMULATED_ELEMENTS)
+        self.mesh = mesh
+        self._forward = ForwardModel(mesh, skin, protocol, contact_ohm_m2)
+        self._sheet = np.full(mesh.n_elements, skin.conductivity_s_per_m)
+        self._cover = Cover(mesh)
+
+    def thinned(self, before: SurfaceMap) -> None:
+        """The skin was on the surface ``before`` when it was made; its thickness keeps the
+        volume."""
+        self._sheet *= lifted(self.mesh, before).true_areas_mm2 / self.mesh.true_areas_mm2
+
+    def voltages(self, touches: Sequence[TrueTouch]) -> FloatArray:
+        """Return the voltages (m,) in V with ``touches``."""
+        if not touches:
+            return self._forward.voltages(self._sheet)
+        return self._forward.voltages(with_touches(self._sheet, self._cover.change(touches)))
+
+
 def solved(
     skin: Skin,
     protocol: Protocol,
@@ -119,11 +145,27 @@ def solved(
 ) -> dict[str, FloatArray]:
     """``quiet`` (m,) and ``frames`` (k, m) in V. Where the skin was on the surface ``thinner``
     before it was stretched, its thickness keeps the volume."""
-    mesh = mesh_for_elements(skin, SIMULATED_ELEMENTS)
-    forward = ForwardModel(mesh, skin, protocol, contact_ohm_m2)
-    sheet = np.full(mesh.n_elements, skin.conductivity_s_per_m)
+    model = SolvedSurface(skin, protocol, contact_ohm_m2)
     if thinner is not None:
-        sheet = sheet * lifted(mesh, thinner).true_areas_mm2 / mesh.true_areas_mm2
-    cover = Cover(mesh)
-    frames = [forward.voltages(with_touches(sheet, cover.change(one))) for one in scenes]
-    return {"quiet": forward.voltages(sheet), "frames": np.array(frames)}
+        model.thinned(thinner)
+    frames = [model.voltages(one) for one in scenes]
+    return {"quiet": model.voltages(()), "frames": np.array(frames)}
+
+
+def bounds_mm(
+    model: SolvedSurface, surface: SurfaceMap, scenes: list[tuple[TrueTouch, ...]], sigma_v: float
+) -> list[float]:
+    """The median error in mm on ``surface`` of each touch of ``scenes`` that the Cramer-Rao bound
+    allows for one frame with noise ``sigma_v`` (``benchmarks.limit_bound``; contacts count as
+    known). Slopes are differences over BOUND_STEPS, which are so wide that the mesh does not
+    matter."""
+    size, found = size_of(surface), []
+    x_mm, y_mm, *others = BOUND_STEPS
+    for scene in scenes:
+        slopes = touch_slopes_v(model, scene, (size * x_mm, size * y_mm, *others)) / sigma_v
+        scales = surface.at([[one.x_mm, one.y_mm] for one in scene]).scale
+        found += [
+            scale * one.median_mm
+            for scale, one in zip(scales.tolist(), bounds_of(slopes, scene), strict=True)
+        ]
+    return found
