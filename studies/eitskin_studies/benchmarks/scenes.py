@@ -61,7 +61,8 @@ def effects_table(
     """The moving scene with no effect, with each alone, with all: plain values fit for JSON, times
     in s of the processor, so that other processes hardly count."""
     base = moving_scene(frames)
-    every = {name: DEFAULTS.get(name, {}) for name in BUILT_IN}
+    # flex is for skins that cover a surface
+    every = {name: DEFAULTS.get(name, {}) for name in BUILT_IN if name != "flex"}
     cases = {"none": {}, **{name: {name: table} for name, table in every.items()}, "all": every}
     workspace, times, rows = MeshCache(), dict[str, list[float]](), {}
     work = [(name, k) for k in range(rounds + 1) for name in cases]

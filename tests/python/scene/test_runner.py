@@ -38,7 +38,7 @@ def test_frames_carry_the_truth_and_survive_their_file(tmp_path):
     assert again.meta["plan"]["method"] == "update" and again.meta["counters"]["states"] == 7
 
 
-@pytest.mark.parametrize("added", sorted(set(BUILT_IN) - {"noise"}))
+@pytest.mark.parametrize("added", sorted(set(BUILT_IN) - {"noise", "flex"}))
 def test_adding_an_effect_leaves_the_others_samples_as_they_were(added, mesh_cache, monkeypatch):
     """Every number that named effects draw, by stream: equal to the bit with and without one more
     effect."""
@@ -94,7 +94,8 @@ def test_arithmetic_is_complex_only_with_phase(mesh_cache, monkeypatch):
 
     monkeypatch.setattr(cem, "factorise", watched)
     monkeypatch.setattr(forward_steps, "factorise", watched)
-    everything = {name: {} for name in BUILT_IN if name != "phase"} | {"noise": {"snr_db": 60.0}}
+    names = set(BUILT_IN) - {"phase", "flex"}
+    everything = {name: {} for name in sorted(names)} | {"noise": {"snr_db": 60.0}}
     for scene in (moving_scene(3), still_scene(3, effects=everything)):
         done = simulate_frames(compile_scene(scene))
         assert done.work.complex_factorisations == 0 and done.true_v.dtype == np.float64
