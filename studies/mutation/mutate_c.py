@@ -92,7 +92,7 @@ def read_libraries() -> dict[str, Library]:
 
 
 def read_costs() -> dict[str, float]:
-    """How long ctest found that each test takes."""
+    """Return how long each test took, as ctest found."""
     costs = BUILD / "Testing" / "Temporary" / "CTestCostData.txt"
     lines = map(str.split, costs.read_text().splitlines() if costs.is_file() else ())
     return {words[0]: float(words[2]) for words in lines if len(words) == 3}
@@ -181,7 +181,7 @@ class Workshop:
         return original == changed
 
     def try_mutant(self, mutant: Mutant) -> str:
-        """Which test noticed; "same" or "refused" by the compiler; empty where none did."""
+        """Return the test that noticed; "same" or "refused" by the compiler; empty if none did."""
         source = (ROOT / mutant.file).read_text()
         for name in next(n for at, n in LIBRARIES.items() if mutant.file.startswith(at)):
             library = self.libraries[name]

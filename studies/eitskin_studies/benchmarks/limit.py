@@ -219,8 +219,8 @@ class _Bench:
     def measured(
         self, name: str, snr_db: float, pattern: str = "adjacent", noise: str = OWN_DB
     ) -> list[SceneResult]:
-        """What the core finds in the scenes of a set. With ``VOLTS``, sigma is that of the adjacent
-        pattern, and the converter has no steps."""
+        """Return what the core finds in the scenes of a set. With ``VOLTS``, sigma is that of the
+        adjacent pattern, and the converter has no steps."""
         finder = self._finder(pattern)
         finder.look_for(SETS[name].sign)
         world = World(name, snr_db=snr_db, adc_bits=0 if noise == VOLTS else None)

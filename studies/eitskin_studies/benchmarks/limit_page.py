@@ -49,7 +49,7 @@ def for_page(result: LimitResult, command: str) -> Filling:
 
 
 def failures(row: Row) -> list[str]:
-    """What a line fails by, in words."""
+    """Return why a line fails, in words."""
     words = []
     if not math.isfinite(row.median_mm):
         return ["no touch was found"]

@@ -1,4 +1,4 @@
-"""How long from a contact to the packet that tells of it, split by where the time goes; and whether
+"""The time from a contact to the packet that reports it, split by its parts; and whether
 six sinks at once get every frame of a skin that streams for minutes.
 
 Scan, solve and link are an emulated board's: a scene taps the skin at random moments, at 500

@@ -186,7 +186,7 @@ def _own_mesh_cache() -> MeshCache:
 
 
 def chunk_path(folder: Path, chunk: int) -> Path:
-    """Where ``chunk`` is kept."""
+    """Return the path of the file of ``chunk``."""
     return folder / f"chunk_{chunk:06d}.npz"
 
 

@@ -85,7 +85,7 @@ class ExperimentOutcome:
 
 @dataclass(eq=False)
 class Workspace:
-    """Where an experiment works: its settings, its folder, and what is kept there. Use
+    """The place where an experiment works: its settings, its folder, and what is kept there. Use
     :func:`workspace_in`."""
 
     settings: ExperimentSettings

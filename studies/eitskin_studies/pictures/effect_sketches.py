@@ -72,7 +72,7 @@ def background(axes: Axes, session: EffectSession, parameters: Any) -> None:
 
 
 def misplacement(axes: Axes, session: EffectSession, parameters: Any) -> None:
-    """Where electrodes are described and where they are."""
+    """Draw the electrodes where they are described and where they are."""
     from eitskin.scene.effects.misplacement import make
 
     skin = session.skin
@@ -184,7 +184,7 @@ def contact_impedance(axes: Axes, session: EffectSession, parameters: Any) -> No
 
 
 def detached(axes: Axes, session: EffectSession, parameters: Any) -> None:
-    """Which rows of the scan are lost."""
+    """Draw the rows of the scan that are lost."""
     count = session.skin.electrodes.count
     state = np.full((count, count), np.nan)
     rows = session.protocol.drive_measure.astype(int)

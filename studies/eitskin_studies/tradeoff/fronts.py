@@ -134,8 +134,8 @@ def pareto(
     accuracy: Callable[[OperatingPoint], float | None],
     least_gain: float = 0.0,
 ) -> list[OperatingPoint]:
-    """Those that no other beats: none that costs no more is as accurate, less ``least_gain``.
-    Cheapest first."""
+    """Return the points that no other beats: none that costs no more is as accurate, less
+    ``least_gain``. The cheapest comes first."""
     known = [
         (c, -a, k)
         for k, p in enumerate(points)

@@ -76,8 +76,8 @@ def _numbers(of: Share) -> list[float]:
 
 
 def frames_of(finder: CoreFinder, of: WorldScenes) -> list[dict[str, Any]]:
-    """Of each scene that was not rejected: how many touches there are (``true``), whether it is
-    said to be crowded, and of each found touch whether it is a true one, its confidence, its
+    """Return for each scene that was not rejected how many touches there are (``true``), whether it
+    is said to be crowded, and of each found touch whether it is a true one, its confidence, its
     distance from the true place in mm and that over what it is said to be (Mahalanobis, squared);
     None where that is not known."""
     finder.look_for(of.world.sign)

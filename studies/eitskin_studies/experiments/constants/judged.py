@@ -101,7 +101,7 @@ class Runner:
         self._engines: dict[bytes, CoreEngine] = {}
 
     def engine(self, blob: bytes) -> CoreEngine:
-        """That of a stored model."""
+        """Return the engine of a stored model."""
         if blob not in self._engines:
             self._engines[blob] = CoreEngine(blob)
         return self._engines[blob]

@@ -1,5 +1,5 @@
-"""Which C tests fail where a constant is halved or doubled: a constant that changes no judging
-scene may be what a promise rests on.
+"""Finds the C tests that fail if a constant is halved or doubled: a constant that changes no
+judging scene may be what a promise rests on.
 
 The tests of the preset `host` take the core from a shared library. They are run with a variant in
 its place, whose constants an environment variable sets. A test is run only where it uses the

@@ -42,7 +42,7 @@ class TouchStream:
         return tuple(sample(track, np.arange(FRAMES) / RATE_HZ) for track in self.tracks)
 
     def true_mm(self, frame: int) -> tuple[tuple[int, ...], FloatArray, FloatArray]:
-        """Which fingers are there in a frame, their places (k, 2) and radii (k,)."""
+        """Return the fingers that are there in a frame, their places (k, 2) and radii (k,)."""
         there = tuple(i for i, one in enumerate(self.samples) if one.there[frame])
         places = np.array(
             [(self.samples[i].x_mm[frame], self.samples[i].y_mm[frame]) for i in there]

@@ -44,8 +44,8 @@ def any_change(effects: Effects, constant: Constant) -> bool:
 
 
 def most_of(constant: Constant) -> float:
-    """What a value must stay below to be ranked: a fraction doubled beyond 1 is none, and says only
-    what happens without its rule."""
+    """Return the limit below which a value is ranked: a fraction that is doubled beyond 1 is no
+    fraction, and says only what happens without its rule."""
     return 1.0 if 0.5 < constant.value < 1 else float("inf")
 
 

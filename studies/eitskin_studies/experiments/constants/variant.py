@@ -84,7 +84,7 @@ class Constant:
 
 
 def constants_of(root: Path) -> list[Constant]:
-    """Those of the core, in the table's order."""
+    """Return the constants of the core, in the table's order."""
     table = load_toml(root / "tables" / "constants.toml", "table of constants")
     listed: list[Constant] = []
     for module in table.get("module", table.get("room", [])):

@@ -49,7 +49,7 @@ class Row:
 
 
 def rows() -> list[Row]:
-    """Those of the page."""
+    """Return the rows of the page."""
     listed = [
         Row(f"press, rise {rise_ms} ms", "presses", 400, partial(_press, rise_s=rise_ms / 1e3))
         for rise_ms in (0, 30, 60, 120)
@@ -269,7 +269,7 @@ def _glitches(
 
 
 def _with(player: Player, scan: Scan, rng: np.random.Generator) -> BoolArray:
-    """Which rows (t, 2) drive, and measure, with an electrode that fails."""
+    """Return which rows (t, 2) drive, and measure, with an electrode that fails."""
     table = player.model.protocol.drive_measure[scan.row] == rng.integers(
         player.model.protocol.n_electrodes
     )

@@ -51,7 +51,7 @@ class Row:
 
 
 def rows() -> list[Row]:
-    """Those of the page."""
+    """Return the rows of the page."""
     slow, sudden = partial(_pressed, rise_s=0.06), partial(_pressed, rise_s=0.0)
     later, one = partial(slow, later_s=0.06), partial(_apart, count=1)
     three, five = (partial(_apart, count=count) for count in (3, 5))

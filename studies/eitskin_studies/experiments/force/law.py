@@ -73,7 +73,7 @@ class SheetLaw(PressLaw):
         return self.sheet_mm
 
     def contrast(self, grams: float) -> float:
-        """That of a round tip's 50 g, by pressure."""
+        """Return the contrast of a round tip's 50 g, scaled by the pressure."""
         tip = WEIGHTS_G[0] * self.pressure_kpa(grams) / NOMINAL.pressure_kpa(WEIGHTS_G[0])
         return super().contrast(tip)
 

@@ -1,4 +1,4 @@
-"""The limits of the count: fits that are told where every touch is and begin there.
+"""The limits of the count, by fits that begin at the true places of all touches.
 
 *Discs*: the oracle's fit of discs, begun at the true centres: if this is exact where the core is
 not, its search is at fault. *Nonlinear*: least squares on the

@@ -179,7 +179,7 @@ def _details(score: Score, touches: int, method: str) -> tuple[str, ...]:
 
 
 def single_table(counted: CountedScenes) -> Table:
-    """Where one touch is found."""
+    """Return the errors of the place of a single touch."""
     rows = []
     for method in (*NAMES, *CLASSICAL):
         for snr_db in SNRS_DB:

@@ -41,7 +41,7 @@ def conditions(touch_data: TouchData, workspace: Workspace) -> str:
 
 
 def closing(counted: CountedScenes, limited: Sequence[Limit]) -> str:
-    """How far the core counts, and what limits it."""
+    """Say how many touches the core counts, and what limits the count."""
     default = NAMES[0]
     far = ", ".join(f"{where} {_far(counted, where, default)}" for where in GEOMETRIES)
     return (

@@ -1,4 +1,4 @@
-"""How well touches are told to be ellipses: which are said to be, and how far off these are."""
+"""How often touches are reported as ellipses, and how far off their axes are."""
 
 import math
 from collections.abc import Mapping

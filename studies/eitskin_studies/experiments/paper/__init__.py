@@ -98,8 +98,8 @@ def run(workspace: Workspace) -> ExperimentOutcome:
 
 
 def _places(skin: Skin, protocol: Any, from_rim_mm: float) -> list[list[float]]:
-    """Where the weights' middles are: each where a disc changes the frame most, of all places that
-    far from the rim and from those before."""
+    """Return the middles of the weights: each one is where a disc changes the frame most, among
+    all places that are that far from the rim and far enough from those before."""
     linear = linearise(skin, protocol, pixels_across=64, elements=MODEL_ELEMENTS)
     centres = linear.grid.centres_mm()
     room = rim_distance_mm(skin.outline, centres) >= from_rim_mm

@@ -165,7 +165,7 @@ def _scans(scans: list[Scan], beyond: Mapping[str, float]) -> Table:
 def _best(
     limits: Mapping[str, Mapping[str, float]], medians: Mapping[str, Mapping[str, float]]
 ) -> str:
-    """Which pattern has the least bound, and with which the product is best, by noise."""
+    """Say for each noise which pattern has the least bound, and with which the product is best."""
     said = []
     for noise in NOISES:
         limit, product = limits[noise], medians[noise]

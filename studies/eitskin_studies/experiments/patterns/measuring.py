@@ -130,8 +130,8 @@ class PatternNoise:
         return kept
 
     def found(self, name: str, noise: str) -> Mapping[str, Any]:
-        """What the product finds with a pattern at a noise: settings, scores of each scene, and
-        the part of the rows that touches drive out of range with a gain for each row."""
+        """Return what the product finds with a pattern at a noise: settings, scores of each scene,
+        and the part of the rows that touches drive out of range with a gain for each row."""
         sigma_v = self.noise_v(name, noise)
         facts = {
             "patterns": "found",

@@ -69,9 +69,9 @@ def _tip_corners(name: str) -> list[Corner]:
 
 
 def hand_places_mm() -> FloatArray:
-    """Where somebody would put 16 electrodes on the hand: three at the wrist, two on the palm's
-    outer edge, fingertips, webs between fingers, two on the thumb's side; counterclockwise from the
-    wrist's middle, (16, 2) on the rim.
+    """Return 16 places of electrodes on the hand's rim (16, 2), as a person might choose them:
+    three at the wrist, two on the palm's outer edge, fingertips, webs between fingers, two on the
+    thumb's side; counterclockwise from the wrist's middle.
     """
     tips = {
         name: np.asarray(tip) + half * np.subtract(tip, base) / math.dist(tip, base)

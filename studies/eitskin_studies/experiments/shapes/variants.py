@@ -51,8 +51,8 @@ class ShapeVariant:
         )
 
     def regions(self, points_mm: npt.ArrayLike, deepest_mm: float) -> list[str]:
-        """Where each of ``points_mm`` (k, 2) lies: a hand's palm, thumb or fingers; else which
-        third of the way from the rim to the place that is ``deepest_mm`` within it."""
+        """Name the region of each of ``points_mm`` (k, 2): a hand's palm, thumb or fingers; else
+        which third of the way from the rim to the place that is ``deepest_mm`` within it."""
         if self.hand:
             return [
                 name if name in ("palm", "thumb") else "fingers" for name in hand_region(points_mm)

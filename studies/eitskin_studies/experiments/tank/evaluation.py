@@ -203,8 +203,8 @@ def places_of(frames: Frames, number: int, sign: int) -> FloatArray:
 
 
 def increases(shown: Shown, threshold: float | None, grid: Grid) -> list[FloatArray]:
-    """Where increases are found in each image, (t, 2) mm: touches where there are, else groups of
-    pixels beyond ``threshold``."""
+    """Return the increases that are found in each image, (t, 2) mm: touches if there are, else
+    groups of pixels beyond ``threshold``."""
     if shown.touches is not None:
         return [_centres(touches, 1) for touches in shown.touches]
     assert threshold is not None

@@ -124,12 +124,12 @@ def rods(folder: Path) -> tuple[Rods, ...]:
 
 
 def touch_like(frames: Frames) -> list[int]:
-    """Which frames show metal only."""
+    """Return the numbers of the frames that show metal only."""
     return [frames.frame_name.index(name) for name in TOUCH_LIKE]
 
 
 def truth_of(frames: Frames, raster: Raster) -> tuple[BoolArray, BoolArray]:
-    """Where conductive and where resistive objects are on ``raster``: (k, p) each."""
+    """Return masks of conductive and of resistive objects on ``raster``: (k, p) each."""
     assert frames.truth_mask is not None and frames.truth_mask_extent_mm is not None
     box = frames.truth_mask_extent_mm
     conductive, resistive = (
