@@ -97,6 +97,8 @@ def _noise_or_change(panel: Any, case: Case) -> None:
     if len(untouched) >= MIN_UNTOUCHED:
         noise = 1e6 * row_noise(np.nan_to_num(untouched))
         panel.semilogy(np.maximum(noise, 1e-6), ".", color=MEASURED, markersize=4)
+        for axis_format in (panel.yaxis.set_major_formatter, panel.yaxis.set_minor_formatter):
+            axis_format("{x:g}")
         median = float(np.median(noise[case.trusted])) if case.trusted.any() else 0.0
         panel.axhline(median, color=EXPECTED)
         panel.set(xlabel="row", ylabel="µV")
