@@ -4,6 +4,7 @@ documented ranges."""
 import dataclasses
 import importlib
 import inspect
+import re
 from pathlib import Path
 from typing import Any
 
@@ -177,6 +178,14 @@ def test_the_page_has_every_effect_and_parameter(name):
     for row in describe_parameters(module):
         assert f"`{row['name']}`" in section
     assert 2_000 < (folder / f"{name}.png").stat().st_size < 60_000
+
+
+def test_pages_count_the_effects():
+    root = Path(__file__).resolve().parents[4]
+    for page in ("CHANGELOG.md", "docs/guide/gallery.md"):
+        text = (root / page).read_text(encoding="utf-8")
+        counted = re.findall(r"\b(\d+) (?:effects,|are in \[effects\])", text)
+        assert counted == [str(len(BUILT_IN))], page
 
 
 def test_misplacement_and_outline_are_the_only_geometry_steps():
