@@ -75,7 +75,8 @@ class FairLock:
             self._depth -= 1
             if self._depth == 0:
                 self._owner = None
-                self._changed.notify_all()
+                if self._waiting:
+                    self._changed.notify_all()
 
     def __enter__(self) -> None:
         self.acquire()
