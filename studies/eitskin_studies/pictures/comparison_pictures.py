@@ -8,6 +8,7 @@ from eitskin.view.panels import draw_panels, save_picture
 from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
 from eitskin_studies.compare.run import CompareResult, Comparison
 from eitskin_studies.harness.thresholds import THRESHOLDS
+from eitskin_studies.pictures.style import COLOURS
 
 
 def truth_marks(scene: TouchScene, sheet_s_per_m: float) -> tuple[Mark, ...]:
@@ -82,10 +83,9 @@ def draw_curves(path: str | Path, comparison: Comparison) -> None:
         figure = matplotlib.figure.Figure(figsize=(7.2, 4.4), layout="constrained")
         axes = figure.add_subplot()
         for k, result in enumerate(comparison.results):
-            style = ("-", "--", "-.")[k // 10 % 3]
-            (line,) = axes.plot(
-                THRESHOLDS, result.curve, style, color=f"C{k % 10}", label=result.name
-            )
+            style = ("-", "--", ":")[k // len(COLOURS) % 3]
+            colour = COLOURS[k % len(COLOURS)]
+            (line,) = axes.plot(THRESHOLDS, result.curve, style, color=colour, label=result.name)
             at = THRESHOLDS.index(result.threshold)
             axes.plot(result.threshold, result.curve[at], "o", color=line.get_color(), markersize=5)
         axes.axhline(
