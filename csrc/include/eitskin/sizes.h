@@ -182,11 +182,11 @@ extern "C" {
     ((23u + 2u * EITS_MAX_MOVE_TERMS) * sizeof(eits_real) + (35u + 13u) * sizeof(uint32_t))
 
 /* The multipole model keeps a pixel and a mirror per touch and the weights of the pixels around one
- * inside the skin, the joint fit its gradient. */
+ * inside the skin, the joint fit its gradient and what it has taken of its budget. */
 #define EITS_JOINT_NUMBERS                                            \
     (EITS_MAX_TOUCHES * (4u * sizeof(eits_real) + sizeof(uint32_t)) + \
      2u * EITS_POLE_TERMS * EITS_POLE_POINTS * sizeof(eits_real) +    \
-     (EITS_JOINT_PARAMETERS + 1u) * sizeof(eits_real) + sizeof(uint32_t))
+     (EITS_JOINT_PARAMETERS + 1u) * sizeof(eits_real) + sizeof(uint32_t) + sizeof(uint64_t))
 
 /* Bytes of the context, at the workspace's start. csrc/src/api/setup.c asserts that it fits, and
  * that little is left over. */

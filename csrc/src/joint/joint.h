@@ -22,7 +22,7 @@ typedef struct eits_joint {
     eits_shape shape[EITS_MAX_TOUCHES];
     uint32_t from[EITS_MAX_TOUCHES]; /* which of the fit's discs it was or was part of */
     uint32_t free[EITS_MAX_TOUCHES]; /* those that are varied, by ascending number */
-    uint64_t most; /* multiply-accumulates of settling after which no step is begun */
+    uint64_t most; /* multiply-accumulates of settling after which no step or trial is begun */
     uint32_t count, free_count;
     uint32_t parameters; /* of each: EITS_JOINT_DISC or EITS_JOINT_ELLIPSE */
     eits_real cost;      /* F */
@@ -118,6 +118,10 @@ void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled,
 /* settle.c: to the minimum of F: as discs, and as ellipses where discs leave more than noise and
  * ellipses lower F by enough. Returns the multiply-accumulates. */
 uint64_t eits_joint_settle(eits_context *ctx, eits_joint *j);
+
+/* The multiply-accumulates after which settling begins no step: `most`, or what the frame's joint
+ * fits before it have left of EITS_JOINT_FRAME_WORK. */
+uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most);
 
 /* split.c: try what is long as two. `spent` is the frame's work so far; returns what was added. The
  * normal equations are those about *j then. */

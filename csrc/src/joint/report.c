@@ -263,6 +263,7 @@ int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j)
 {
     eits_joint_known known[EITS_MAX_TOUCHES];
     j->count = 0;
+    ctx->joint.spent = 0;
     eits_pole_forget(ctx);
     if (!may_fit(ctx, f) || !fit_clearly(ctx, f, j, known))
         return 0;

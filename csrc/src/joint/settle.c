@@ -13,7 +13,7 @@ static void try_ellipses(eits_context *ctx, eits_joint *j, uint64_t *macs)
     shaped.parameters = EITS_JOINT_ELLIPSE;
     eits_joint_keep(ctx, j);
     if (j->cost - eits_joint_expect(ctx, &shaped, macs) > EITS_JOINT_SHAPE_HOPE * needed) {
-        eits_joint_continue(ctx, &shaped, R(INFINITY), macs);
+        eits_joint_continue(ctx, &shaped, EITS_JOINT_LOST * eits_joint_freedom(ctx, &shaped), macs);
         if (j->cost - shaped.cost > needed * eits_joint_excess(ctx, &shaped)) {
             *j = shaped;
             return;
@@ -22,19 +22,28 @@ static void try_ellipses(eits_context *ctx, eits_joint *j, uint64_t *macs)
     eits_joint_back(ctx, j);
 }
 
+uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most)
+{
+    const uint64_t spent = ctx->joint.spent,
+                   left = spent < EITS_JOINT_FRAME_WORK ? EITS_JOINT_FRAME_WORK - spent : 0;
+    return most < left ? most : left;
+}
+
 uint64_t eits_joint_settle(eits_context *ctx, eits_joint *j)
 {
     const eits_real folds = (eits_real)eits_joint_folds(ctx);
     uint64_t macs = 0;
-    j->most = EITS_JOINT_WORK;
+    j->most = eits_joint_limit(ctx, EITS_JOINT_WORK);
     eits_pole_clear(ctx, j->count);
     eits_joint_free_all(j);
     eits_joint_descend(ctx, j, 2, folds + EITS_JOINT_HOPELESS, &macs);
     if (j->parameters == EITS_JOINT_DISC &&
         j->count * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS &&
-        j->misfit > folds + EITS_JOINT_FITS && 4u * macs < EITS_JOINT_WORK)
+        j->misfit > folds + EITS_JOINT_FITS && 4u * macs < j->most)
         try_ellipses(ctx, j, &macs);
-    macs += eits_joint_split(ctx, j, macs);
+    if (eits_joint_excess(ctx, j) < EITS_JOINT_LOST)
+        macs += eits_joint_split(ctx, j, macs);
     eits_joint_choose_kinds(ctx, j, macs, &macs);
+    ctx->joint.spent += macs;
     return macs;
 }

@@ -135,7 +135,8 @@ static int best_two(eits_context *ctx, const eits_joint *one, uint32_t k, eits_j
     int current = 0;     /* whether the normal equations are those about *best */
     if (far && !is_long) /* the model's errors look like two fingers side by side, too */
         return 0;
-    for (int d = 0; d < (far ? 1 : DIRECTIONS) && !(found && least < fits); ++d) {
+    for (int d = 0; d < (far ? 1 : DIRECTIONS) && !(found && least < fits) && *spent < one->most;
+         ++d) {
         /* what is clearly long is cut across first */
         eits_joint two = as_two(one, k, is_long ? DIRECTIONS - 1 - d : d);
         if (!eits_pole_on_skin(ctx, two.shape[k].x, two.shape[k].y) ||
@@ -191,7 +192,7 @@ uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent)
     const uint64_t begin = spent;
     uint8_t tried[EITS_MAX_TOUCHES] = {0};
     uint32_t tries = 0;
-    j->most = spent + EITS_JOINT_SPLIT_WORK;
+    j->most = eits_joint_limit(ctx, spent + EITS_JOINT_SPLIT_WORK);
     while (j->count < ctx->options.max_touches && tries < EITS_JOINT_SPLIT_TRIES &&
            spent < j->most && (j->count + 1u) * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS) {
         const uint32_t k = longest(j, tried);
