@@ -100,8 +100,8 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         all_tables(results),
         {"seed": settings.seed, "noise_v": sigma_v, "cases": data},
         {
-            "counts.png": Drawing(draw_counts, [asdict(bar) for bar in bars]),
-            "patterns.png": Drawing(draw_patterns, [asdict(bar) for bar in bars]),
+            "counts.svg": Drawing(draw_counts, [asdict(bar) for bar in bars]),
+            "patterns.svg": Drawing(draw_patterns, [asdict(bar) for bar in bars]),
         },
         {"conditions": said, "best": _best(bars)},
     )
