@@ -286,6 +286,13 @@ void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, u
     }
 }
 
+uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most)
+{
+    const uint64_t spent = ctx->joint.spent,
+                   left = spent < EITS_JOINT_FRAME_WORK ? EITS_JOINT_FRAME_WORK - spent : 0;
+    return most < left ? most : left;
+}
+
 void eits_joint_free_all(eits_joint *j)
 {
     j->free_count = j->count;

@@ -80,6 +80,10 @@ static inline eits_real eits_joint_strength(const eits_shape *s)
     return s->amplitude * s->radius * s->radius;
 }
 
+/* The multiply-accumulates after which settling begins no step: `most`, or what the frame's joint
+ * fits before it have left of EITS_JOINT_FRAME_WORK. */
+uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most);
+
 /* All shapes are varied. */
 void eits_joint_free_all(eits_joint *j);
 
@@ -118,10 +122,6 @@ void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled,
 /* settle.c: to the minimum of F: as discs, and as ellipses where discs leave more than noise and
  * ellipses lower F by enough. Returns the multiply-accumulates. */
 uint64_t eits_joint_settle(eits_context *ctx, eits_joint *j);
-
-/* The multiply-accumulates after which settling begins no step: `most`, or what the frame's joint
- * fits before it have left of EITS_JOINT_FRAME_WORK. */
-uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most);
 
 /* split.c: try what is long as two. `spent` is the frame's work so far; returns what was added. The
  * normal equations are those about *j then. */

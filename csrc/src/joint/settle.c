@@ -22,13 +22,6 @@ static void try_ellipses(eits_context *ctx, eits_joint *j, uint64_t *macs)
     eits_joint_back(ctx, j);
 }
 
-uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most)
-{
-    const uint64_t spent = ctx->joint.spent,
-                   left = spent < EITS_JOINT_FRAME_WORK ? EITS_JOINT_FRAME_WORK - spent : 0;
-    return most < left ? most : left;
-}
-
 uint64_t eits_joint_settle(eits_context *ctx, eits_joint *j)
 {
     const eits_real folds = (eits_real)eits_joint_folds(ctx);
