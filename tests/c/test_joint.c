@@ -132,7 +132,7 @@ static eits_fit start_near(const eits_context *ctx, const eits_shape *shape, uin
 static void fit_jointly(eits_context *ctx, eits_fit *f)
 {
     eits_joint j = {.count = 0};
-    eits_fit_jointly(ctx, f, &j);
+    eits_fit_jointly(ctx, &ctx->scratch, f, &j);
 }
 
 static double place_error(const eits_fit *f, const eits_shape *shape, uint32_t k)
@@ -242,6 +242,138 @@ TEST(drift_of_the_gain_moves_no_place)
     }
     CHECK_NEAR(moved_mm[1], 0, 0.06);
     CHECK(moved_mm[0] > 0.3);
+}
+
+/* ---- the number of touches ---- */
+
+/* The first `count` discs as shapes, all free, in the metric of the frame. */
+static eits_joint shapes_of(eits_context *ctx, const eits_shape *shape, uint32_t count)
+{
+    eits_joint j = {.count = count, .parameters = EITS_JOINT_DISC, .most = UINT64_MAX};
+    for (uint32_t k = 0; k < count; ++k)
+        j.shape[k] = shape[k];
+    eits_joint_free_all(&j);
+    eits_pole_forget(ctx);
+    eits_pole_clear(ctx, count);
+    (void)eits_joint_metric(ctx);
+    return j;
+}
+
+/* Shapes that are held answer as in an evaluation of all: F is the same, and so are the normal
+ * equations of the free one. */
+TEST(shapes_that_are_held_answer_as_before)
+{
+    eits_context *ctx = open_joint(1);
+    stage_shapes(ctx, DISCS, 2, 1);
+    eits_joint all = shapes_of(ctx, DISCS, 2), one = all;
+    (void)eits_joint_evaluate(ctx, &all, 6);
+    const eits_real whole = eits_lower_row(ctx->joint.normal, 4)[4];
+    eits_joint_free_one(&one, 1);
+    CHECK(eits_joint_hold(ctx, &one, 1) > 0);
+    (void)eits_joint_evaluate(ctx, &one, 1);
+    CHECK_NEAR(one.cost, all.cost, 0.05 * (double)all.cost); /* held ones send one order more */
+    CHECK_NEAR(ctx->joint.normal[0], whole, 0.001 * (double)whole);
+    one.shape[1].x += 1; /* another place, and back */
+    (void)eits_joint_evaluate(ctx, &one, 2);
+    CHECK(one.cost > 2 * all.cost);
+    (void)eits_joint_restore(ctx, &all, 1);
+    (void)eits_joint_evaluate(ctx, &all, 1);
+    const eits_real again = all.cost;
+    (void)eits_joint_evaluate(ctx, &all, 6);
+    CHECK_NEAR(again, all.cost, 0.02 * (double)all.cost + 0.02);
+}
+
+/* A disc that is not there scores nothing; one that is missing scores much, and its strength is
+ * about that of the true one. */
+TEST(a_missing_disc_scores_by_what_the_others_cannot_take_up)
+{
+    eits_context *ctx = open_joint(1);
+    eits_real gain[2], scale[2];
+    uint64_t macs = 0;
+    stage_shapes(ctx, DISCS, 2, 1);
+    eits_joint j = shapes_of(ctx, DISCS, 1);
+    eits_joint_descend(ctx, &j, 2, R(INFINITY), &macs);
+    j.shape[1] = eits_joint_usual(ctx, DISCS[1].x, DISCS[1].y, 0);
+    j.shape[2] = eits_joint_usual(ctx, DISCS[1].x, DISCS[1].y, 1);
+    CHECK(j.shape[1].amplitude > 0 && j.shape[2].amplitude < 0 &&
+          j.shape[1].radius == j.shape[2].radius);
+    CHECK(eits_joint_score(ctx, &j, 2, gain, scale) > 0);
+    CHECK(gain[0] > 50 && scale[0] > 0);
+    CHECK(gain[1] == 0 && scale[1] == 0); /* of the other sign */
+    stage_shapes(ctx, DISCS, 1, 1);
+    eits_joint true_one = shapes_of(ctx, DISCS, 1);
+    true_one.shape[1] = j.shape[1];
+    eits_joint_descend(ctx, &true_one, 2, R(INFINITY), &macs);
+    (void)eits_joint_score(ctx, &true_one, 1, gain, scale);
+    CHECK(gain[0] < 10);
+}
+
+/* The image of this bench is not that of its multipoles, so that none can be found here. */
+TEST(a_search_drops_a_disc_that_the_data_do_without)
+{
+    eits_context *ctx = open_joint(1);
+    stage_shapes(ctx, DISCS, 2, 1);
+    eits_joint j = shapes_of(ctx, DISCS, 3);
+    j.shape[2].radius = R(0.5);
+    j.shape[2].y -= R(0.5);
+    j.shape[0].x += R(0.7);
+    CHECK(!eits_joint_near(&j.shape[0], &j.shape[2], EITS_JOINT_CLEAR_APART));
+    (void)eits_joint_evaluate(ctx, &j, 2);
+    CHECK(j.misfit > EITS_JOINT_SEARCHED * eits_joint_freedom(ctx, &j));
+    CHECK(eits_joint_search(ctx, &ctx->scratch, &j, 0) > 0);
+    CHECK_EQUAL(j.count, 2);
+    for (uint32_t k = 0; k < j.count; ++k)
+        CHECK_NEAR(hypot((double)(j.shape[k].x - DISCS[k].x), (double)(j.shape[k].y - DISCS[k].y)),
+                   0, 0.1);
+}
+
+/* The first disc is in two halves, which overlap. */
+TEST(a_search_merges_the_halves_of_a_touch)
+{
+    eits_context *ctx = open_joint(1);
+    stage_shapes(ctx, DISCS, 2, 1);
+    eits_joint j = shapes_of(ctx, DISCS, 3);
+    j.shape[2] = DISCS[0];
+    j.shape[0].radius *= R(0.7);
+    j.shape[2].radius *= R(0.7);
+    j.shape[0].x -= R(0.6);
+    j.shape[2].x += R(0.6);
+    (void)eits_joint_evaluate(ctx, &j, 2);
+    CHECK(eits_joint_search(ctx, &ctx->scratch, &j, 0) > 0);
+    CHECK_EQUAL(j.count, 2);
+    for (uint32_t k = 0; k < j.count; ++k)
+        CHECK_NEAR(hypot((double)(j.shape[k].x - DISCS[k].x), (double)(j.shape[k].y - DISCS[k].y)),
+                   0, 0.3);
+}
+
+TEST(nothing_is_sought_where_the_discs_leave_no_more_than_noise)
+{
+    eits_context *ctx = open_joint(1);
+    uint64_t macs = 0;
+    stage_shapes(ctx, DISCS, 2, 1);
+    eits_joint j = shapes_of(ctx, DISCS, 2);
+    eits_joint_descend(ctx, &j, 2, R(INFINITY), &macs);
+    const uint64_t once = eits_joint_evaluate(ctx, &j, 1);
+    CHECK_EQUAL(eits_joint_search(ctx, &ctx->scratch, &j, 0), once);
+    CHECK_EQUAL(j.count, 2);
+}
+
+/* A disc that reaches beyond the rim becomes as small as it has to be. */
+TEST(discs_stay_within_the_rim)
+{
+    eits_context *ctx = open_joint(1);
+    stage_shapes(ctx, DISCS, 1, 1);
+    eits_shape large = DISCS[0];
+    large.radius = 40;
+    eits_joint j = shapes_of(ctx, &large, 1);
+    (void)eits_joint_evaluate(ctx, &j, 2);
+    CHECK_NEAR(j.shape[0].radius, eits_pole_room(ctx, 0, &large), 1e-6);
+    CHECK(j.shape[0].radius < 40 && isfinite((double)j.cost));
+    large.radius = R(1.1) * eits_pole_room(ctx, 0, &large);
+    j = shapes_of(ctx, &large, 1);
+    (void)eits_joint_evaluate(ctx, &j, 2);
+    CHECK(j.shape[0].radius < large.radius);
+    CHECK_NEAR(eits_joint_strength(&j.shape[0]) / eits_joint_strength(&large), 1, 1e-5);
 }
 
 /* ---- the metric ---- */
@@ -398,7 +530,7 @@ TEST(clear_touches_need_no_test)
     eits_fit f = start_near(ctx, apart, 2);
     f.tested = 0;
     eits_joint j;
-    CHECK_EQUAL(eits_fit_clearly(ctx, &f, &j), 1);
+    CHECK_EQUAL(eits_fit_clearly(ctx, &ctx->scratch, &f, &j), 1);
     CHECK(f.tested == 1 && f.count == 2);
     for (uint32_t k = 0; k < 2; ++k)
         CHECK(place_error(&f, apart, k) < 0.2 && f.rise[k] > 10 && f.confidence[k] > R(0.9));
@@ -406,7 +538,7 @@ TEST(clear_touches_need_no_test)
     f = start_near(ctx, apart, 3);
     f.tested = 0;
     const eits_fit before = f;
-    CHECK_EQUAL(eits_fit_clearly(ctx, &f, &j), 0);
+    CHECK_EQUAL(eits_fit_clearly(ctx, &ctx->scratch, &f, &j), 0);
     CHECK(unchanged(&f, &before) && f.tested == 0);
 }
 

@@ -466,6 +466,21 @@ static double complex expected_induced(const eits_context *ctx, const eits_shape
     return sum;
 }
 
+TEST(the_distance_from_the_rim_is_half_of_that_from_the_image)
+{
+    for (int rim = CENTRED; rim < RIMS; ++rim) {
+        eits_context *ctx = dense_bench_open(&b, ROUND, 0);
+        if (rim != CENTRED)
+            store_rim(rim);
+        for (uint32_t k = 0; k < 3; ++k) {
+            const double complex at = (double)THREE[k].x + I * (double)THREE[k].y;
+            const double expected = cabs(mirrored(at, rim) - at) / 2;
+            (void)eits_pole_home(ctx, 0, &THREE[k]);
+            CHECK_NEAR(eits_pole_room(ctx, 0, &THREE[k]), expected, 0.005 * expected);
+        }
+    }
+}
+
 /* Shapes so near that they meet with all orders; halves hold the mirror to 2^-11. */
 TEST(touches_and_images_send_what_a_contour_says)
 {

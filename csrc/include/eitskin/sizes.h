@@ -145,6 +145,7 @@ extern "C" {
     /* the joint fit: a metric, columns of one block of folds, and the normal equations */         \
     ARRAY(joint.weight, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                           \
     ARRAY(joint.drift, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                            \
+    ARRAY(joint.rest, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                             \
     ARRAY(joint.column, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_PARAMETERS * EITS_JOINT_BLOCK)) \
     ARRAY(joint.along, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_PARAMETERS * EITS_JOINT_NUISANCES)) \
     ARRAY(joint.nuisance, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_NUISANCES * (EITS_JOINT_NUISANCES + 1u) / 2u)) \

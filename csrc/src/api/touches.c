@@ -41,7 +41,7 @@ static int fit(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits
     j->count = 0;
     if (eits_can_fit_jointly(ctx)) {
         eits_fit_peaks(ctx, scratch, f);
-        if (eits_fit_clearly(ctx, f, j))
+        if (eits_fit_clearly(ctx, scratch, f, j))
             return 1;
         const int begun = eits_joint_is_likely(ctx, j);
         const uint64_t macs = f->macs;
@@ -78,7 +78,7 @@ static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fi
     if (f->count > 0)
         eits_recheck_stale_reference(ctx);
     if (!clear)
-        eits_fit_jointly(ctx, f, &j);
+        eits_fit_jointly(ctx, scratch, f, &j);
 }
 
 /* Return which image shows the frame: that of the touches if they explain it. */

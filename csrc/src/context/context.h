@@ -222,6 +222,7 @@ typedef struct eits_multipole {
 typedef struct eits_joint_memory {
     eits_real *weight; /* n_folded: 1 / sigma; 0 for a fold that is left out */
     eits_real *drift;  /* n_folded: the direction of the gain's drift in that metric, of length 1 */
+    eits_real *rest;   /* n_folded: what held shapes leave of the data (eits_joint_hold) */
     eits_real *column; /* EITS_JOINT_PARAMETERS x EITS_JOINT_BLOCK */
     eits_real *along;  /* EITS_JOINT_PARAMETERS x EITS_JOINT_NUISANCES */
     eits_real *nuisance; /* their factor L, packed by rows (joint/metric.c) */

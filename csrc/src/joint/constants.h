@@ -96,6 +96,14 @@
  * cost a fit of discs; smaller: the solver's ripple does */
 #define EITS_JOINT_WEAK R(0.1)
 
+/* and so are those at the rim [of the strongest]. as JOINT_WEAK; at .1 seven weights 6 mm from the
+ * rim are counted in a third of frames, at .3 in all */
+#define EITS_JOINT_WEAK_AT_RIM R(0.3)
+
+/* which have the rim within this distance along either axis [pixels]. larger: weak touches near the
+ * rim cost a fit of discs; smaller: the solver's ripple does */
+#define EITS_JOINT_RIM R(2.0)
+
 /* near touches need no test where F rises by more without either. as JOINT_CLEAR_RISE */
 #define EITS_JOINT_TWO_RISE R(300.0)
 
@@ -107,6 +115,11 @@
  * [of the data's square]. larger: things that are no ellipses are reported as some; smaller: fewer
  * touches profit */
 #define EITS_JOINT_MAX_LEFT R(0.0256)
+
+/* a fit before the test that leaves less stands where that after it does not explain the frame [of
+ * the data's square]. larger: what no test has seen is reported; smaller: touches at the rim are
+ * lost by the test */
+#define EITS_JOINT_SURE R(0.001)
 
 /* what is longer, axes of 1.5 to 1, is cut across its length first; on a skin that differs from the
  * model nothing else is tried as two. larger: costs; smaller: the same */
@@ -150,6 +163,43 @@
 /* least strength of the weaker [of the stronger]. as JOINT_SPLIT_FALL */
 #define EITS_JOINT_SPLIT_WEAKER R(0.25)
 
+/* two also stand where less is left, though that is more than noise: others may be wrong as well
+ * [of the misfit over noise before]. larger: what is no touch is taken for some; smaller: frames
+ * with two such pairs keep both */
+#define EITS_JOINT_SPLIT_MOST R(0.6)
+
+/* discs from which on missing touches are sought in what they leave, and not by splitting. larger:
+ * missing touches stay missing; smaller: costs on fingers */
+#define EITS_JOINT_CROWD 5
+
+/* a crowd fits where the misfit is below [of the noise]. larger: crowds with a wrong touch are
+ * reported; smaller: they cost a test, which often drops a touch */
+#define EITS_JOINT_CROWD_FITTED R(2.5)
+
+/* nothing is sought where the misfit is below [of the noise]. larger: missing touches stay missing;
+ * smaller: costs */
+#define EITS_JOINT_SEARCHED R(1.25)
+
+/* nor where more is left [of the data's square]. larger: costs where the fit is far from any
+ * minimum; smaller: several missing touches stay missing */
+#define EITS_JOINT_SEARCHABLE R(0.1)
+
+/* nor where half of the touches are light and more is left [of the data's square]. larger: costs on
+ * sheets that have drifted; smaller: weights at the rim, which count as light, stay wrong */
+#define EITS_JOINT_LIGHT_SEARCHABLE R(0.01)
+
+/* weaker candidates are not tried: the model's errors at the rim look like such [of a disc of the
+ * expected radius]. larger: small touches stay missing; smaller: costs */
+#define EITS_JOINT_ADD_STRENGTH R(0.25)
+
+/* greatest strength with which a new disc begins [of a disc of the expected radius]. larger: it
+ * takes up what others answer */
+#define EITS_JOINT_ADD_MOST R(2.0)
+
+/* in such a search a disc goes where F rises by less without it. larger: small touches go; smaller:
+ * the solver's ripple stays */
+#define EITS_JOINT_NEEDED R(20.0)
+
 /* the data fit where the misfit is below [of the noise]. larger: a sheet that has drifted is taken
  * for touches; smaller: long fingers are not refined */
 #define EITS_JOINT_FITTED R(1.5)
@@ -189,7 +239,7 @@
 
 /* most Gauss-Newton steps of one descent. larger: costs in hard frames; smaller: fingers are not
  * settled */
-#define EITS_JOINT_STEPS 9
+#define EITS_JOINT_STEPS 14
 
 /* nothing is fitted from shapes that leave more [of what no touches leave]. larger: costs on false
  * peaks; smaller: strong touches are given up */
@@ -197,7 +247,18 @@
 
 /* a joint fit begins no step after it has taken so many [multiply-accumulates]. larger: slow frames
  * with many touches; smaller: many touches are not settled */
-#define EITS_JOINT_WORK 800000
+#define EITS_JOINT_WORK 600000
+
+/* the fit before the test, which begins further off, may take so many more where it is close
+ * [multiply-accumulates]. as JOINT_WORK */
+#define EITS_JOINT_FURTHER 600000
+
+/* it is close where less is left [of what no touches leave]. larger: costs on sheets that have
+ * drifted; smaller: nine weights at the rim are not settled */
+#define EITS_JOINT_CLOSE R(0.05)
+
+/* a search begins no step after it has taken so many [multiply-accumulates]. as JOINT_WORK */
+#define EITS_JOINT_SEARCH_WORK 700000
 
 /* trying one as two begins no step after it has taken so many [multiply-accumulates]. as
  * JOINT_WORK */
@@ -205,7 +266,11 @@
 
 /* all joint fits of a frame together begin no step after they have taken so many
  * [multiply-accumulates]. as JOINT_WORK */
-#define EITS_JOINT_FRAME_WORK 1600000
+#define EITS_JOINT_FRAME_WORK 2200000
+
+/* rounds by which the induced field is made about shapes that are settled. larger: costs; smaller:
+ * touches at the rim are not at their minimum */
+#define EITS_JOINT_ROUNDS 4
 
 /* damping of the first step, relative to the diagonal. larger: slower; smaller: wild first steps */
 #define EITS_JOINT_DAMPING R(0.001)
@@ -223,7 +288,7 @@
 #define EITS_JOINT_SETTLED R(1.0)
 
 /* the descent ends where F fell to so near of what the linearisation said. as JOINT_SETTLED */
-#define EITS_JOINT_AS_PREDICTED R(1.5)
+#define EITS_JOINT_AS_PREDICTED R(0.5)
 
 /* least pivot of the normal equations [relative]. larger: steps are too short; smaller: rounding
  * decides */

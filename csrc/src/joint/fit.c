@@ -40,14 +40,15 @@ static eits_real prior_of(const eits_context *ctx, const eits_joint *j)
 
 /* ---- F and its normal equations ---- */
 
+static const eits_poles DISCS = {.orders = 3, .sent = 2}, ELLIPSES = {.orders = 5, .sent = 3};
+
 /* Discs need fewer orders; where a single shape is none, all have those of ellipses. */
 static const eits_poles *poles_of(const eits_joint *j)
 {
-    static const eits_poles discs = {.orders = 3, .sent = 2}, ellipses = {.orders = 5, .sent = 3};
     int round = j->parameters == EITS_JOINT_DISC;
     for (uint32_t k = 0; k < j->count; ++k)
         round &= j->shape[k].e1 == 0 && j->shape[k].e2 == 0;
-    return round ? &discs : &ellipses;
+    return round ? &DISCS : &ELLIPSES;
 }
 
 /* Sums over blocks of folds. */
@@ -86,22 +87,28 @@ static void add_columns(eits_context *ctx, uint32_t n, uint32_t first, uint32_t 
     eits_joint_add_along(ctx, m->column, n, first, count, m->along);
 }
 
-/* What the shapes leave of one block, weighed, and their columns into the normal equations. */
-static uint64_t add_block(eits_context *ctx, const eits_joint *j, int slopes, uint32_t first,
-                          uint32_t count, sums *s)
+/* Whether some shapes are held (eits_joint_hold). */
+static int holds(const eits_joint *j)
+{
+    return j->free_count < j->count;
+}
+
+/* What the free shapes leave of one block, weighed, and their columns into the normal equations,
+ * behind them the answers of `further` discs. */
+static uint64_t add_block(eits_context *ctx, const eits_joint *j, int slopes, uint32_t further,
+                          uint32_t first, uint32_t count, sums *s)
 {
     eits_joint_memory *m = &ctx->joint;
     eits_real value[BLOCK], left[BLOCK];
     uint64_t macs = 4u * (uint64_t)count;
-    eits_copy(left, ctx->frame.d + first, count);
-    for (uint32_t k = 0, free = 0; k < j->count; ++k) {
+    eits_copy(left, (holds(j) ? m->rest : ctx->frame.d) + first, count);
+    for (uint32_t free = 0; free < j->free_count; ++free) {
+        const uint32_t k = j->free[free];
         eits_pole_out out = {.value = value};
-        const int varies = slopes && free < j->free_count && j->free[free] == k;
-        for (uint32_t p = 0; varies && p < j->parameters; ++p)
+        for (uint32_t p = 0; slopes && p < j->parameters; ++p)
             out.slope[p] = m->column + (size_t)BLOCK * (free * j->parameters + p);
-        free += (uint32_t)varies;
         macs += eits_pole_rows(ctx, k, &j->shape[k], poles_of(j), first, count, &out);
-        for (uint32_t i = 0; varies && i < count; ++i) /* of log |q| */
+        for (uint32_t i = 0; slopes && i < count; ++i) /* of log |q| */
             out.slope[3][i] *= j->shape[k].amplitude;
         for (uint32_t i = 0; i < count; ++i)
             left[i] -= value[i];
@@ -110,19 +117,63 @@ static uint64_t add_block(eits_context *ctx, const eits_joint *j, int slopes, ui
         left[i] *= m->weight[first + i];
     s->square += eits_dot(ctx->kernels, left, left, count);
     eits_joint_add_along(ctx, left, 1, first, count, s->along);
-    const uint32_t n = slopes ? j->free_count * j->parameters : 0;
+    uint32_t n = slopes ? j->free_count * j->parameters : 0;
+    for (uint32_t k = j->count; k < j->count + further; ++k) {
+        const eits_pole_out out = {.value = m->column + (size_t)BLOCK * n++};
+        macs += eits_pole_rows(ctx, k, &j->shape[k], &DISCS, first, count, &out);
+    }
     add_columns(ctx, n, first, count, left);
     return macs + (uint64_t)n * (n + 7u + 2u * m->errors) / 2u * count;
 }
 
+/* Whether shape k is one of the free ones. */
+static int is_free(const eits_joint *j, uint32_t k)
+{
+    int is = 0;
+    for (uint32_t i = 0; i < j->free_count; ++i)
+        is |= j->free[i] == k;
+    return is;
+}
+
+uint64_t eits_joint_hold(eits_context *ctx, const eits_joint *j, uint32_t rounds)
+{
+    eits_real value[BLOCK], *rest = ctx->joint.rest;
+    const uint32_t folds = ctx->model->n_folded;
+    uint64_t macs = 0;
+    for (uint32_t k = 0; k < j->count && rounds > 0; ++k)
+        macs += eits_pole_home(ctx, k, &j->shape[k]);
+    macs += eits_pole_induced(ctx, j->shape, j->count, &ELLIPSES, rounds);
+    eits_copy(rest, ctx->frame.d, folds);
+    for (uint32_t first = 0; first < folds; first += BLOCK) {
+        const uint32_t count = folds - first < BLOCK ? folds - first : BLOCK;
+        for (uint32_t k = 0; k < j->count; ++k) {
+            const eits_pole_out out = {.value = value};
+            if (is_free(j, k))
+                continue;
+            macs += eits_pole_rows(ctx, k, &j->shape[k], poles_of(j), first, count, &out);
+            for (uint32_t i = 0; i < count; ++i)
+                rest[first + i] -= value[i];
+        }
+    }
+    return macs;
+}
+
+uint64_t eits_joint_restore(eits_context *ctx, const eits_joint *j, uint32_t k)
+{
+    const uint64_t macs = eits_pole_home(ctx, k, &j->shape[k]);
+    eits_pole_lift(ctx, k);
+    return macs + eits_pole_induced_in(ctx, j->shape, j->count, &k, 1, &ELLIPSES, 2);
+}
+
 /* What no touch causes out of the normal equations, and the priors into them. */
-static void finish_normal(eits_context *ctx, const eits_joint *j, const sums *s)
+static void finish_normal(eits_context *ctx, const eits_joint *j, uint32_t further, const sums *s)
 {
     eits_joint_memory *m = &ctx->joint;
     const uint32_t nuisances = 1u + m->errors;
-    for (uint32_t a = 0; a < j->free_count * j->parameters; ++a) {
-        const uint32_t p = a % j->parameters;
-        const eits_shape *shape = &j->shape[j->free[a / j->parameters]];
+    const uint32_t n = j->free_count * j->parameters;
+    for (uint32_t a = 0; a < n + further; ++a) {
+        const uint32_t p = a < n ? a % j->parameters : 0; /* further discs have no prior */
+        const eits_shape *shape = &j->shape[a < n ? j->free[a / j->parameters] : 0];
         const eits_real prior = eits_joint_precision(shape, p);
         eits_real *row = eits_lower_row(m->normal, a), *along = along_of(ctx, a);
         eits_joint_finish_along(ctx, along);
@@ -134,38 +185,56 @@ static void finish_normal(eits_context *ctx, const eits_joint *j, const sums *s)
     }
 }
 
+/* The polynomial of shape k's field; a shape that would reach beyond the rim is made as small as it
+ * has to be, of the same strength: its multipoles and their images do not converge otherwise. */
+static uint64_t bring_home(eits_context *ctx, uint32_t k, eits_shape *s)
+{
+    const uint64_t macs = eits_pole_home(ctx, k, s);
+    const eits_real room = eits_pole_room(ctx, k, s);
+    if (s->radius > room) {
+        const eits_real larger = s->radius / room;
+        s->amplitude = eits_clamp(s->amplitude * larger * larger, -EITS_JOINT_MAX_AMPLITUDE,
+                                  EITS_JOINT_MAX_AMPLITUDE);
+        s->radius = room;
+    }
+    return macs;
+}
+
 /* F, and with `slopes` its normal equations. */
-static uint64_t evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds, int slopes)
+static uint64_t evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds, int slopes,
+                         uint32_t further)
 {
     eits_joint_memory *m = &ctx->joint;
-    const uint32_t folds = ctx->model->n_folded, n = slopes ? j->free_count * j->parameters : 0;
+    const uint32_t folds = ctx->model->n_folded,
+                   n = (slopes ? j->free_count * j->parameters : 0) + further;
     sums s;
     s.square = 0;
     eits_zero(s.along, 1u + m->errors);
     uint64_t macs = 0;
-    for (uint32_t k = 0; k < j->count && rounds > 0; ++k)
-        macs += eits_pole_home(ctx, k, &j->shape[k]);
-    macs += eits_pole_induced(ctx, j->shape, j->count, poles_of(j), rounds);
+    for (uint32_t k = 0; k < j->free_count && rounds > 0; ++k)
+        macs += bring_home(ctx, j->free[k], &j->shape[j->free[k]]);
+    macs +=
+        eits_pole_induced_in(ctx, j->shape, j->count, j->free, j->free_count, poles_of(j), rounds);
     eits_zero(m->normal, EITS_LOWER_SIZE(n));
     eits_zero(m->gradient, n);
     for (uint32_t a = 0; a < n; ++a)
         eits_zero(along_of(ctx, a), 1u + m->errors);
     for (uint32_t first = 0; first < folds; first += BLOCK) {
         const uint32_t count = folds - first < BLOCK ? folds - first : BLOCK;
-        macs += add_block(ctx, j, slopes, first, count, &s);
+        macs += add_block(ctx, j, slopes, further, first, count, &s);
     }
     j->left = eits_fma(-s.along[0], s.along[0], s.square);
     eits_joint_finish_along(ctx, s.along);
     j->misfit = s.square - product(s.along, s.along, 1u + m->errors);
     j->cost = j->misfit + prior_of(ctx, j);
     if (slopes)
-        finish_normal(ctx, j, &s);
+        finish_normal(ctx, j, further, &s);
     return macs;
 }
 
 uint64_t eits_joint_evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds)
 {
-    return evaluate(ctx, j, rounds, 1);
+    return evaluate(ctx, j, rounds, 1, 0);
 }
 
 /* ---- steps ---- */
@@ -232,12 +301,40 @@ eits_real eits_joint_expect(eits_context *ctx, eits_joint *j, uint64_t *macs)
 {
     const uint32_t n = j->free_count * j->parameters;
     eits_real d[MAX_PARAMETERS];
-    eits_pole_clear(ctx, j->count);
+    for (uint32_t k = 0; k < j->free_count; ++k)
+        eits_pole_lift(ctx, j->free[k]);
     *macs += eits_joint_evaluate(ctx, j, 2) + (uint64_t)n * n * (n + 6u) / 6u;
     factor(ctx, n, EITS_JOINT_DAMPING);
     eits_copy(d, ctx->joint.gradient, n);
     solve(ctx, n, d);
     return j->cost - eits_dot(ctx->kernels, ctx->joint.gradient, d, n);
+}
+
+uint64_t eits_joint_score(eits_context *ctx, eits_joint *j, uint32_t further, eits_real *gain,
+                          eits_real *scale)
+{
+    const uint32_t n = j->count * j->parameters;
+    eits_real by[MAX_PARAMETERS], step[MAX_PARAMETERS];
+    uint64_t macs = 0;
+    for (uint32_t k = j->count; k < j->count + further; ++k) {
+        macs += bring_home(ctx, k, &j->shape[k]);
+        eits_pole_lift(ctx, k);
+    }
+    macs += evaluate(ctx, j, 1, 1, further);
+    factor(ctx, n, 0);
+    eits_copy(step, ctx->joint.gradient, n);
+    eits_lower_solve(ctx->joint.factor, n, step);
+    for (uint32_t i = 0; i < further; ++i) {
+        const eits_real *row = eits_lower_row(ctx->joint.normal, n + i);
+        eits_copy(by, row, n);
+        eits_lower_solve(ctx->joint.factor, n, by);
+        const eits_real own = row[n + i] - eits_dot(ctx->kernels, by, by, n),
+                        answer = ctx->joint.gradient[n + i] - eits_dot(ctx->kernels, by, step, n);
+        const int explains = answer > 0 && own > EITS_JOINT_MIN_PIVOT * row[n + i];
+        gain[i] = explains ? answer * answer / own : 0;
+        scale[i] = explains ? answer / own : 0;
+    }
+    return macs + (uint64_t)n * n * (n / 6u + further);
 }
 
 void eits_joint_keep(eits_context *ctx, const eits_joint *j)
@@ -248,6 +345,20 @@ void eits_joint_keep(eits_context *ctx, const eits_joint *j)
 void eits_joint_back(eits_context *ctx, const eits_joint *j)
 {
     eits_copy(ctx->joint.normal, ctx->joint.kept, EITS_LOWER_SIZE(j->count * j->parameters));
+}
+
+uint64_t eits_joint_return_to(eits_context *ctx, eits_joint *j)
+{
+    eits_pole_clear(ctx, j->count);
+    eits_joint_free_all(j);
+    return eits_joint_evaluate(ctx, j, EITS_JOINT_ROUNDS);
+}
+
+uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most)
+{
+    const uint64_t spent = ctx->joint.spent,
+                   left = spent < EITS_JOINT_FRAME_WORK ? EITS_JOINT_FRAME_WORK - spent : 0;
+    return most < left ? most : left;
 }
 
 void eits_joint_descend(eits_context *ctx, eits_joint *j, uint32_t rounds, eits_real hopeless,
@@ -270,27 +381,26 @@ void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, u
         if (!(predicted > EITS_JOINT_SETTLED) ||
             !(j->misfit < EITS_JOINT_WORSE * ctx->joint.energy) ||
             (predicted < EITS_JOINT_HOPEFUL * j->cost && j->cost - predicted > hopeless) ||
-            *macs > j->most)
+            *macs > j->most + (j->misfit < EITS_JOINT_CLOSE * ctx->joint.energy ? j->further : 0))
             return;
         eits_joint trial = moved(ctx, j, d);
-        *macs += evaluate(ctx, &trial, 1, 0) + (uint64_t)n * n * (n + 6u) / 6u;
+        *macs += evaluate(ctx, &trial, 1, 0, 0) + (uint64_t)n * n * (n + 6u) / 6u;
         const eits_real fallen = j->cost - trial.cost;
         if (fallen > 0) {
             *j = trial;
             damping *= EITS_JOINT_DAMP_LESS;
             if (eits_fabs(predicted - fallen) < EITS_JOINT_AS_PREDICTED * eits_joint_excess(ctx, j))
                 return;
-            *macs += evaluate(ctx, j, 0, 1);
+            *macs += evaluate(ctx, j, 0, 1, 0);
         } else /* again, a shorter step */
             damping = eits_larger(EITS_JOINT_DAMP_MORE * damping, EITS_JOINT_DAMPED);
     }
 }
 
-uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most)
+void eits_joint_free_one(eits_joint *j, uint32_t k)
 {
-    const uint64_t spent = ctx->joint.spent,
-                   left = spent < EITS_JOINT_FRAME_WORK ? EITS_JOINT_FRAME_WORK - spent : 0;
-    return most < left ? most : left;
+    j->free_count = 1;
+    j->free[0] = k;
 }
 
 void eits_joint_free_all(eits_joint *j)

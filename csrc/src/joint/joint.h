@@ -21,9 +21,12 @@ enum { EITS_JOINT_DISC = 4, EITS_JOINT_ELLIPSE = 6 };
 typedef struct eits_joint {
     eits_shape shape[EITS_MAX_TOUCHES];
     uint32_t from[EITS_MAX_TOUCHES]; /* which of the fit's discs it was or was part of */
-    uint32_t free[EITS_MAX_TOUCHES]; /* those that are varied, by ascending number */
-    uint64_t most; /* multiply-accumulates of settling after which no step or trial is begun */
+    /* those that are varied, by ascending number; the others are held (eits_joint_hold) */
+    uint32_t free[EITS_MAX_TOUCHES];
+    uint64_t most;    /* multiply-accumulates of settling after which no step or trial is begun */
+    uint64_t further; /* so many more where the shapes leave little */
     uint32_t count, free_count;
+    uint32_t searches;   /* 1: missing touches are sought */
     uint32_t parameters; /* of each: EITS_JOINT_DISC or EITS_JOINT_ELLIPSE */
     eits_real cost;      /* F */
     eits_real misfit;    /* its first line: the data's part */
@@ -70,6 +73,14 @@ eits_real eits_joint_expect(eits_context *ctx, eits_joint *j, uint64_t *macs);
 /* The same from an evaluation about *j, which is the last that was made. */
 void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, uint64_t *macs);
 
+/* The multiply-accumulates after which settling begins no step: `most`, or what the frame's joint
+ * fits before it have left of EITS_JOINT_FRAME_WORK. */
+uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most);
+
+/* Make the induced field and the normal equations about shapes that were settled before others were
+ * tried, all of them free. Returns the multiply-accumulates. */
+uint64_t eits_joint_return_to(eits_context *ctx, eits_joint *j);
+
 /* Keep the normal equations about *j, and take them back, where something else was tried. */
 void eits_joint_keep(eits_context *ctx, const eits_joint *j);
 void eits_joint_back(eits_context *ctx, const eits_joint *j);
@@ -80,14 +91,31 @@ static inline eits_real eits_joint_strength(const eits_shape *s)
     return s->amplitude * s->radius * s->radius;
 }
 
-/* The multiply-accumulates after which settling begins no step: `most`, or what the frame's joint
- * fits before it have left of EITS_JOINT_FRAME_WORK. */
-uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most);
-
 /* All shapes are varied. */
 void eits_joint_free_all(eits_joint *j);
 
+/* Hold the shapes that are not free, after `rounds` more of what all send each other: evaluations
+ * about shapes that are otherwise those of *j, with fewer than all free, then make the answers of
+ * the free ones alone. What the others leave of the data is in joint.rest. */
+uint64_t eits_joint_hold(eits_context *ctx, const eits_joint *j, uint32_t rounds);
+
+/* Shape k alone is free. */
+void eits_joint_free_one(eits_joint *j, uint32_t k);
+
+/* The field about shape k as it was, after another shape was tried in its place. */
+uint64_t eits_joint_restore(eits_context *ctx, const eits_joint *j, uint32_t k);
+
+/* Score `further` discs that stand behind the shapes of *j, which is at a minimum of F and has all
+ * of them free: by how much F falls with each, and how many times as strong it is then, as
+ * linearised, all shapes free. Their number is limited by EITS_JOINT_PARAMETERS. The normal
+ * equations are those about *j then. */
+uint64_t eits_joint_score(eits_context *ctx, eits_joint *j, uint32_t further, eits_real *gain,
+                          eits_real *scale);
+
 /* prior.c */
+
+/* A disc of the expected size, of the strong kind. */
+eits_shape eits_joint_usual(const eits_context *ctx, eits_real x, eits_real y, int insulates);
 
 /* The prior's part of F for one shape. */
 eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_t parameters);
@@ -121,11 +149,19 @@ void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled,
 
 /* settle.c: to the minimum of F: as discs, and as ellipses where discs leave more than noise and
  * ellipses lower F by enough. Returns the multiply-accumulates. */
-uint64_t eits_joint_settle(eits_context *ctx, eits_joint *j);
+uint64_t eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_joint *j);
+
+/* search.c: change the number of discs where they leave more than noise. `spent` is the frame's
+ * work so far; returns what was added. The normal equations are those about *j then. */
+uint64_t eits_joint_search(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
+                           uint64_t spent);
 
 /* split.c: try what is long as two. `spent` is the frame's work so far; returns what was added. The
  * normal equations are those about *j then. */
 uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent);
+
+/* Whether two shapes count as two touches: they are far enough apart and of similar strength. */
+int eits_joint_are_two(const eits_shape *a, const eits_shape *b);
 
 /* Numbers that the data have beside what the shapes take. */
 eits_real eits_joint_freedom(const eits_context *ctx, const eits_joint *j);
@@ -164,7 +200,7 @@ int eits_can_fit_jointly(const eits_context *ctx);
  * needed and no two may be one, no test is needed: *f becomes the result, as if tested, and 1 is
  * returned. Else *f stays as it is. Does nothing where the model has no fields, where the option is
  * off, and on an instrument that is far from the model; j->count is 0 then. */
-int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j);
+int eits_fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j);
 
 /* Whether the shapes leave so little that their number is likely right. */
 int eits_joint_is_likely(const eits_context *ctx, const eits_joint *j);
@@ -175,6 +211,6 @@ void eits_joint_give(const eits_context *ctx, const eits_joint *j, eits_fit *f);
 /* After the test: the same for the touches that it left; *j is from eits_fit_clearly. Touches stay
  * as they are where the joint fit leaves too much of the data, and on a sheet that has drifted, of
  * which the metric does not know. */
-void eits_fit_jointly(eits_context *ctx, eits_fit *f, eits_joint *j);
+void eits_fit_jointly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j);
 
 #endif

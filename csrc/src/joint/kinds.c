@@ -14,12 +14,14 @@ static int turn(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *macs)
 {
     eits_joint other = *j;
     other.shape[k] = eits_joint_as_other(&j->shape[k]);
-    other.free_count = 1;
-    other.free[0] = k;
-    eits_pole_clear(ctx, j->count);
+    eits_joint_free_one(&other, k);
+    eits_joint_free_one(j, k);
+    *macs += eits_joint_hold(ctx, j, 1);
     eits_joint_descend(ctx, &other, 2, R(INFINITY), macs);
-    if (!(j->cost - other.cost > EITS_JOINT_SETTLED))
+    if (!(j->cost - other.cost > EITS_JOINT_SETTLED)) {
+        *macs += eits_joint_restore(ctx, j, k);
         return 0;
+    }
     *j = other;
     return 1;
 }
@@ -41,9 +43,8 @@ void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled,
     if (tried == 0)
         return;
     eits_joint_free_all(j);
-    eits_pole_clear(ctx, j->count);
     if (turned > 0)
-        eits_joint_descend(ctx, j, 2, R(INFINITY), macs);
+        eits_joint_descend(ctx, j, 1, R(INFINITY), macs);
     else
-        *macs += eits_joint_evaluate(ctx, j, 2);
+        *macs += eits_joint_evaluate(ctx, j, 1);
 }

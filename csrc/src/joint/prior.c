@@ -68,6 +68,15 @@ eits_real eits_joint_offset(const eits_context *ctx, const eits_shape *s, uint32
     }
 }
 
+eits_shape eits_joint_usual(const eits_context *ctx, eits_real x, eits_real y, int insulates)
+{
+    return (eits_shape){.x = x,
+                        .y = y,
+                        .radius = EITS_JOINT_RADIUS * ctx->options.touch_seed_radius_mm /
+                                  (eits_real)ctx->model->pixel_mm,
+                        .amplitude = insulates ? -INSULATING.amplitude : STRONG.amplitude};
+}
+
 static eits_real deviation(const eits_shape *s, uint32_t p)
 {
     return p == 2   ? EITS_JOINT_RADIUS_SPREAD

@@ -21,7 +21,7 @@ static eits_shape shape_of(const eits_context *ctx, const eits_disc *d)
 /* The fit's discs as shapes, each of the strength that was found. */
 static eits_joint begin(const eits_context *ctx, const eits_fit *f)
 {
-    eits_joint j = {.count = f->count, .parameters = EITS_JOINT_DISC};
+    eits_joint j = {.count = f->count, .parameters = EITS_JOINT_DISC, .searches = 0};
     for (uint32_t k = 0; k < f->count; ++k) {
         j.from[k] = k;
         j.shape[k] = shape_of(ctx, &f->disc[k]);
@@ -29,16 +29,15 @@ static eits_joint begin(const eits_context *ctx, const eits_fit *f)
     return j;
 }
 
-/* Whether a disc lies on the skin as a whole: multipoles about a middle that is nearer to the rim
- * than its edge do not converge. */
+/* Whether a shape's middle is away from the rim. */
 static int is_inside(const eits_context *ctx, const eits_shape *s)
 {
-    const eits_real r = s->radius;
+    const eits_real r = EITS_JOINT_RIM;
     return eits_pole_on_skin(ctx, s->x - r, s->y) && eits_pole_on_skin(ctx, s->x + r, s->y) &&
            eits_pole_on_skin(ctx, s->x, s->y - r) && eits_pole_on_skin(ctx, s->x, s->y + r);
 }
 
-/* Leave out what the image often shows beside touches: peaks at the rim, and weak ones. If the
+/* Leave out weak peaks, which the image often shows beside touches, above all at the rim. If the
  * others explain the frame, these were none. */
 static void leave_out_weak(const eits_context *ctx, eits_joint *j)
 {
@@ -49,7 +48,8 @@ static void leave_out_weak(const eits_context *ctx, eits_joint *j)
     }
     for (uint32_t k = 0; k < j->count; ++k) {
         const eits_shape *s = &j->shape[k];
-        if (!is_inside(ctx, s) || eits_fabs(eits_joint_strength(s)) < EITS_JOINT_WEAK * greatest)
+        const eits_real least = is_inside(ctx, s) ? EITS_JOINT_WEAK : EITS_JOINT_WEAK_AT_RIM;
+        if (eits_fabs(eits_joint_strength(s)) < least * greatest)
             continue;
         j->from[count] = j->from[k];
         j->shape[count++] = *s;
@@ -201,7 +201,9 @@ static int is_clear(const eits_context *ctx, const eits_joint *j, const eits_joi
                     uint32_t fewer)
 {
     const eits_real excess = eits_joint_excess(ctx, j);
-    if (!(excess < EITS_JOINT_FITTED) ||
+    const eits_real fitted =
+        j->count < EITS_JOINT_CROWD ? EITS_JOINT_FITTED : EITS_JOINT_CROWD_FITTED;
+    if (!(excess < fitted) ||
         (fewer > 0 && j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT))
         return 0;
     for (uint32_t k = 0; k < j->count; ++k) {
@@ -215,9 +217,11 @@ static int is_clear(const eits_context *ctx, const eits_joint *j, const eits_joi
 
 /* Fit the discs of `f` jointly, in *j, those that may be parts of one as one. Returns whether that
  * needs no test; else j->count is 0 unless *j has the discs as they are, settled. */
-static int fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j, eits_joint_known *known)
+static int fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j,
+                       eits_joint_known *known)
 {
     *j = begin(ctx, f);
+    j->searches = 1;
     if (!f->settled)
         leave_out_weak(ctx, j);
     const uint32_t fewer = eits_joint_merge(j);
@@ -225,7 +229,7 @@ static int fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j, eits_joint
     if (j->count > 0 && j->count * j->parameters <= EITS_JOINT_PARAMETERS) {
         if (fewer == 0)
             eits_joint_guess_kinds(ctx, j);
-        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, j);
+        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, scratch, j);
         if (explains(ctx, j)) {
             f->macs += eits_joint_places(ctx, j, known);
             clear = is_clear(ctx, j, known, fewer) && !any_may_be_one(ctx, j, known);
@@ -259,14 +263,9 @@ void eits_joint_give(const eits_context *ctx, const eits_joint *j, eits_fit *f)
     }
 }
 
-int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j)
+/* The shapes become the frame's touches, as sure as F says. */
+static void take(eits_context *ctx, const eits_joint *j, const eits_joint_known *known, eits_fit *f)
 {
-    eits_joint_known known[EITS_MAX_TOUCHES];
-    j->count = 0;
-    ctx->joint.spent = 0;
-    eits_pole_forget(ctx);
-    if (!may_fit(ctx, f) || !fit_clearly(ctx, f, j, known))
-        return 0;
     const eits_real excess = eits_joint_excess(ctx, j);
     report(ctx, j, known, f);
     f->tested = 1;
@@ -275,6 +274,17 @@ int eits_fit_clearly(eits_context *ctx, eits_fit *f, eits_joint *j)
         f->pair[k] = -1;
         f->confidence[k] = eits_confidence(f->rise[k]);
     }
+}
+
+int eits_fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j)
+{
+    eits_joint_known known[EITS_MAX_TOUCHES];
+    j->count = 0;
+    ctx->joint.spent = 0;
+    eits_pole_forget(ctx);
+    if (!may_fit(ctx, f) || !fit_clearly(ctx, scratch, f, j, known))
+        return 0;
+    take(ctx, j, known, f);
     return 1;
 }
 
@@ -292,19 +302,38 @@ static int same_touches(const eits_context *ctx, const eits_fit *f, const eits_j
     return same;
 }
 
-void eits_fit_jointly(eits_context *ctx, eits_fit *f, eits_joint *j)
+/* Whether the fit before the test explains the frame far better than that of what the test left:
+ * near the rim the discs of the test are a poor model, and it drops touches or adds some. */
+static int was_better(const eits_context *ctx, const eits_joint *first, const eits_joint *j)
+{
+    return !explains(ctx, j) && first->count > 0 && explains(ctx, first) &&
+           left_beyond_noise(ctx, first) < EITS_JOINT_SURE * eits_joint_data(ctx);
+}
+
+void eits_fit_jointly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j)
 {
     eits_joint_known known[EITS_MAX_TOUCHES];
+    const eits_joint first = *j;
     if (!f->tested || !may_fit(ctx, f))
         return;
     if (!same_touches(ctx, f, j)) {
         *j = begin(ctx, f);
         eits_joint_guess_kinds(ctx, j);
-        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, j);
+        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, scratch, j);
     }
-    if (!explains(ctx, j) || (f->drifts && eits_joint_excess(ctx, j) > EITS_JOINT_FITTED))
+    const int back = was_better(ctx, &first, j);
+    if (back) {
+        *j = first;
+        f->macs += eits_joint_return_to(ctx, j);
+    } else if (!explains(ctx, j) || (f->drifts && eits_joint_excess(ctx, j) > EITS_JOINT_FITTED))
         return;
-    f->macs += eits_joint_evaluate(ctx, j, 1) + eits_joint_places(ctx, j, known);
+    else
+        f->macs += eits_joint_evaluate(ctx, j, 1);
+    f->macs += eits_joint_places(ctx, j, known);
+    if (back) {
+        take(ctx, j, known, f);
+        return;
+    }
     for (uint32_t k = f->count; k < j->count; ++k) /* parts of what was split */
         inherit(f, j->from[k], k);
     report(ctx, j, known, f);

@@ -22,18 +22,51 @@ static void try_ellipses(eits_context *ctx, eits_joint *j, uint64_t *macs)
     eits_joint_back(ctx, j);
 }
 
-uint64_t eits_joint_settle(eits_context *ctx, eits_joint *j)
+/* Whether touches may be missing or too many: a crowd that leaves more than noise. On a sheet that
+ * has drifted the image shows many light touches, which leave much; there nothing is sought. */
+static int may_miss(const eits_context *ctx, const eits_joint *j)
+{
+    uint32_t strong = 0;
+    for (uint32_t k = 0; k < j->count; ++k)
+        strong += !eits_joint_is_light(&j->shape[k]);
+    return j->searches && j->count >= EITS_JOINT_CROWD &&
+           (2u * strong > j->count ||
+            j->misfit < EITS_JOINT_LIGHT_SEARCHABLE * ctx->joint.energy) &&
+           j->misfit > EITS_JOINT_SEARCHED * eits_joint_freedom(ctx, j);
+}
+
+/* Search from `discs`; *j becomes what is found, where that fits better, or needs fewer touches. */
+static void try_search(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
+                       const eits_joint *discs, uint64_t *macs)
+{
+    eits_joint found = *discs;
+    eits_joint_keep(ctx, j);
+    *macs += eits_joint_search(ctx, scratch, &found, *macs);
+    const eits_real fall = found.count < j->count ? -EITS_JOINT_NEEDED : EITS_JOINT_SPLIT_FALL;
+    if (j->cost - found.cost > fall * eits_joint_excess(ctx, &found))
+        *j = found;
+    else
+        eits_joint_back(ctx, j);
+}
+
+uint64_t eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_joint *j)
 {
     const eits_real folds = (eits_real)eits_joint_folds(ctx);
     uint64_t macs = 0;
     j->most = eits_joint_limit(ctx, EITS_JOINT_WORK);
+    j->further = j->searches ? EITS_JOINT_FURTHER : 0;
     eits_pole_clear(ctx, j->count);
     eits_joint_free_all(j);
     eits_joint_descend(ctx, j, 2, folds + EITS_JOINT_HOPELESS, &macs);
-    if (j->parameters == EITS_JOINT_DISC &&
-        j->count * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS &&
-        j->misfit > folds + EITS_JOINT_FITS && 4u * macs < j->most)
-        try_ellipses(ctx, j, &macs);
+    j->further = 0;
+    if (j->parameters == EITS_JOINT_DISC) {
+        const eits_joint discs = *j;
+        if (j->count * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS &&
+            j->misfit > folds + EITS_JOINT_FITS && 3u * macs < j->most)
+            try_ellipses(ctx, j, &macs);
+        if (may_miss(ctx, j))
+            try_search(ctx, scratch, j, &discs, &macs);
+    }
     if (eits_joint_excess(ctx, j) < EITS_JOINT_LOST)
         macs += eits_joint_split(ctx, j, macs);
     eits_joint_choose_kinds(ctx, j, macs, &macs);

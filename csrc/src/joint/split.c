@@ -86,7 +86,7 @@ static eits_joint as_two(const eits_joint *one, uint32_t k, int d)
     return two;
 }
 
-static int are_two(const eits_shape *a, const eits_shape *b)
+int eits_joint_are_two(const eits_shape *a, const eits_shape *b)
 {
     const eits_real dx = a->x - b->x, dy = a->y - b->y,
                     apart = eits_sqrt(eits_fma(dx, dx, dy * dy)), p = eits_joint_strength(a),
@@ -113,13 +113,15 @@ static eits_real needed_fall(const eits_context *ctx, const eits_shape *one)
     return eits_weighs_errors(ctx) ? EITS_JOINT_SPLIT_FAR * fall : fall;
 }
 
-/* Whether the two that shape k became stand, beside `one`. */
+/* Whether the two that shape k became stand, beside `one`: the frame then fits, or fits much better
+ * than before: others may be wrong as well. */
 static int stand(const eits_context *ctx, const eits_joint *one, const eits_joint *two, uint32_t k)
 {
     const eits_real excess = eits_joint_excess(ctx, two);
-    return excess < EITS_JOINT_FITTED &&
-           one->cost - two->cost > needed_fall(ctx, &one->shape[k]) * excess &&
-           are_two(&two->shape[k], &two->shape[one->count]);
+    const int explains =
+        excess < EITS_JOINT_FITTED || excess < EITS_JOINT_SPLIT_MOST * eits_joint_excess(ctx, one);
+    return explains && one->cost - two->cost > needed_fall(ctx, &one->shape[k]) * excess &&
+           eits_joint_are_two(&two->shape[k], &two->shape[one->count]);
 }
 
 /* Shape k as two along the direction that the linearisation finds best, or along one by which the
@@ -160,12 +162,10 @@ static int try_other_kind(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t
 {
     eits_joint other = *j;
     other.shape[k] = eits_joint_as_other(&j->shape[k]);
-    other.free_count = 1;
-    other.free[0] = k;
+    eits_joint_free_one(&other, k);
     if (!(eits_joint_expect(ctx, &other, spent) < j->cost - EITS_JOINT_SHAPE_FALL))
         return 0;
-    eits_joint_free_all(&other);
-    eits_joint_descend(ctx, &other, 1, R(INFINITY), spent);
+    eits_joint_continue(ctx, &other, R(INFINITY), spent);
     if (!(other.cost < j->cost - EITS_JOINT_SHAPE_FALL))
         return 0;
     *j = other;
@@ -181,32 +181,54 @@ static int try_two(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *spent
     eits_joint_continue(ctx, &two, R(INFINITY), spent);
     if (!stand(ctx, j, &two, k))
         return 0;
-    eits_joint_free_all(&two);
-    eits_joint_descend(ctx, &two, 1, R(INFINITY), spent);
     *j = two;
     return 1;
+}
+
+/* Whether a shape is worth trying as something else: where one is wrong the data fit worse than
+ * noise does. */
+static int is_doubtful(const eits_context *ctx, const eits_joint *j, uint32_t k)
+{
+    return j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT ||
+           is_large(ctx, &j->shape[k]);
+}
+
+/* Whether one more shape may be tried. A crowd of discs is searched instead (search.c). */
+static int may_split(const eits_context *ctx, const eits_joint *j)
+{
+    const int crowd = j->parameters == EITS_JOINT_DISC && j->count >= EITS_JOINT_CROWD;
+    return !crowd && j->count < ctx->options.max_touches &&
+           (j->count + 1u) * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS;
 }
 
 uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent)
 {
     const uint64_t begin = spent;
     uint8_t tried[EITS_MAX_TOUCHES] = {0};
-    uint32_t tries = 0;
+    uint32_t tries = 0, taken = 0, rounds = 1;
     j->most = eits_joint_limit(ctx, spent + EITS_JOINT_SPLIT_WORK);
-    while (j->count < ctx->options.max_touches && tries < EITS_JOINT_SPLIT_TRIES &&
-           spent < j->most && (j->count + 1u) * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS) {
+    while (may_split(ctx, j) && tries < EITS_JOINT_SPLIT_TRIES + taken && spent < j->most) {
         const uint32_t k = longest(j, tried);
         if (k == j->count)
             break;
         tried[k] = 1;
-        /* where one is wrong the data fit worse than noise does */
-        if (!(j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT) &&
-            !is_large(ctx, &j->shape[k]))
+        if (!is_doubtful(ctx, j, k))
             continue;
-        ++tries;
-        eits_joint_keep(ctx, j);
-        if (!try_other_kind(ctx, j, k, &spent) && !try_two(ctx, j, k, &spent))
-            eits_joint_back(ctx, j);
+        if (tries++ == 0)
+            eits_joint_keep(ctx, j);
+        eits_joint_free_one(j, k);
+        spent += eits_joint_hold(ctx, j, rounds);
+        rounds = 0;
+        if (try_other_kind(ctx, j, k, &spent) || try_two(ctx, j, k, &spent)) {
+            ++taken;
+            rounds = 1;
+        } else
+            spent += eits_joint_restore(ctx, j, k);
     }
+    eits_joint_free_all(j);
+    if (taken > 0)
+        eits_joint_descend(ctx, j, 1, R(INFINITY), &spent);
+    else if (tries > 0)
+        eits_joint_back(ctx, j);
     return spent - begin;
 }

@@ -96,6 +96,17 @@ static mirror mirror_of(const eits_context *ctx, uint32_t j, const eits_shape *s
     return m;
 }
 
+/* A - B z vanishes at the image of the middle, which lies as far behind the rim as that before it.
+ */
+eits_real eits_pole_room(const eits_context *ctx, uint32_t k, const eits_shape *shape)
+{
+    const mirror m = mirror_of(ctx, k, shape);
+    const eits_complex bz = eits_times(m.b, (eits_complex){shape->x, shape->y}),
+                       d = {m.a.re - bz.re, m.a.im - bz.im};
+    const eits_real square = eits_fma(m.b.re, m.b.re, m.b.im * m.b.im);
+    return square > 0 ? eits_sqrt(eits_fma(d.re, d.re, d.im * d.im) / square) / 2 : R(INFINITY);
+}
+
 /* h_0 ... h_terms about `at`. */
 static void mirror_series(const mirror *m, eits_complex at, uint32_t terms, eits_complex *h)
 {
@@ -145,21 +156,20 @@ static eits_complex nearness_of(const eits_shape *i, const eits_shape *j)
 
 /* Add to the field about shape i what shape j sends there, directly and by its image. */
 static uint64_t receive(const eits_context *ctx, const eits_shape *shape, uint32_t i, uint32_t j,
-                        const eits_poles *poles)
+                        const mirror *m, const eits_poles *poles)
 {
     const uint32_t electrodes = ctx->model->n_electrodes;
     const size_t width = 2u * (size_t)electrodes;
     eits_real *to = ctx->multipole.induced + width * EITS_POLE_TERMS * i;
     const eits_real *from = ctx->multipole.sent + width * EITS_POLE_SENT * j;
     const eits_complex at = {shape[i].x, shape[i].y};
-    const mirror m = mirror_of(ctx, j, &shape[j]);
     const eits_complex nearness = nearness_of(&shape[i], &shape[j]);
     eits_complex h[EITS_POLE_TERMS + 1], image[EITS_POLE_TERMS + 1], direct = {1, 0};
     const eits_real reach = EITS_POLE_FAR * (shape[i].radius + shape[j].radius);
     const int far =
         i != j && eits_fma(nearness.re, nearness.re, nearness.im * nearness.im) * reach * reach < 1;
     const uint32_t sent_orders = far ? 1u : poles->sent, terms = far ? 3u : poles->orders + 1u;
-    mirror_series(&m, at, terms, h);
+    mirror_series(m, at, terms, h);
     for (uint32_t q = 0; q <= terms; ++q)
         image[q] = h[q];
     for (uint32_t k = 1; k <= sent_orders; ++k) {
@@ -186,35 +196,55 @@ static uint64_t receive(const eits_context *ctx, const eits_shape *shape, uint32
     return (uint64_t)sent_orders * terms * electrodes * 4u;
 }
 
+void eits_pole_lift(eits_context *ctx, uint32_t k)
+{
+    const size_t slot = EITS_POLE_FIELD(ctx->model->n_electrodes);
+    eits_zero(ctx->multipole.induced + slot * k, slot);
+}
+
 void eits_pole_clear(eits_context *ctx, uint32_t count)
 {
     eits_zero(ctx->multipole.induced,
               2u * (size_t)ctx->model->n_electrodes * EITS_POLE_TERMS * count);
 }
 
-uint64_t eits_pole_induced(eits_context *ctx, const eits_shape *shape, uint32_t count,
-                           const eits_poles *poles, uint32_t rounds)
+uint64_t eits_pole_induced_in(eits_context *ctx, const eits_shape *shape, uint32_t count,
+                              const uint32_t *into, uint32_t into_count, const eits_poles *poles,
+                              uint32_t rounds)
 {
     const uint32_t electrodes = ctx->model->n_electrodes;
     const size_t width = 2u * (size_t)electrodes, slot = width * EITS_POLE_TERMS;
     eits_real *field = ctx->multipole.work, *mode = field + slot;
+    mirror rim[EITS_MAX_TOUCHES];
     uint64_t macs = 0;
+    for (uint32_t j = 0; j < count; ++j)
+        rim[j] = mirror_of(ctx, j, &shape[j]);
     for (uint32_t round = 0; round < rounds; ++round) {
-        for (uint32_t i = 0; i < count; ++i) {
+        for (uint32_t k = 0; k < into_count; ++k) {
+            const uint32_t i = into[k];
             const eits_form f = eits_form_of(&shape[i], poles->orders);
-            const eits_real *induced = ctx->multipole.induced + slot * i;
+            eits_real *induced = ctx->multipole.induced + slot * i;
             const eits_real *own = ctx->multipole.own + slot * i;
             for (size_t e = 0; e < width * poles->orders; ++e)
                 field[e] = own[e] + induced[e];
             eits_modes(&f, field, electrodes, mode);
             send(&f, mode, poles->sent, electrodes,
                  ctx->multipole.sent + width * EITS_POLE_SENT * i);
+            eits_zero(induced, slot);
         }
-        eits_zero(ctx->multipole.induced, slot * count);
-        for (uint32_t i = 0; i < count; ++i) {
+        for (uint32_t k = 0; k < into_count; ++k) {
             for (uint32_t j = 0; j < count; ++j)
-                macs += receive(ctx, shape, i, j, poles);
+                macs += receive(ctx, shape, into[k], j, &rim[j], poles);
         }
     }
-    return macs + (uint64_t)rounds * electrodes * count * 12u * poles->orders;
+    return macs + (uint64_t)rounds * electrodes * into_count * 12u * poles->orders;
+}
+
+uint64_t eits_pole_induced(eits_context *ctx, const eits_shape *shape, uint32_t count,
+                           const eits_poles *poles, uint32_t rounds)
+{
+    uint32_t all[EITS_MAX_TOUCHES];
+    for (uint32_t k = 0; k < count; ++k)
+        all[k] = k;
+    return eits_pole_induced_in(ctx, shape, count, all, count, poles, rounds);
 }

@@ -80,12 +80,25 @@ void eits_pole_field(const eits_context *ctx, uint32_t k, const eits_shape *shap
 uint64_t eits_pole_induced(eits_context *ctx, const eits_shape *shape, uint32_t count,
                            const eits_poles *poles, uint32_t rounds);
 
+/* The same for `into_count` of them, by ascending number: the others keep what comes into them and
+ * what they send. */
+uint64_t eits_pole_induced_in(eits_context *ctx, const eits_shape *shape, uint32_t count,
+                              const uint32_t *into, uint32_t into_count, const eits_poles *poles,
+                              uint32_t rounds);
+
 /* No polynomial is kept: at the start of a frame, so that neither its work nor what its budget
  * allows depends on frames before. */
 void eits_pole_forget(eits_context *ctx);
 
 /* Nothing is induced: before the first rounds of a frame. */
 void eits_pole_clear(eits_context *ctx, uint32_t count);
+
+/* induced.c: the distance of a middle from the rim, pixels: half of that from its image. Slot k
+ * must be at home. */
+eits_real eits_pole_room(const eits_context *ctx, uint32_t k, const eits_shape *shape);
+
+/* Nothing is induced in slot k alone. */
+void eits_pole_lift(eits_context *ctx, uint32_t k);
 
 /* rows.c: where to put a shape's answer on folds first ... first + count - 1, and its slopes by x,
  * y, log(radius), amplitude, e1, e2 with the induced field held; a null pointer: not wanted. */

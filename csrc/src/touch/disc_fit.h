@@ -124,7 +124,7 @@ void eits_fit_centre(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
 
 /* touch.c */
 
-/* Peaks of the image as discs, each moved once. */
+/* Peaks of the image as discs: places and strengths by the image around each alone. */
 void eits_fit_peaks(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* The last stage of that fit alone, for discs whose places and radii are nearly right. */

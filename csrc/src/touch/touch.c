@@ -90,10 +90,9 @@ static void remove_interaction(eits_context *ctx, const eits_scratch *scratch, e
         eits_fit_restart(ctx, scratch, f);
 }
 
-/* Discs at the image's peaks, moved in so many sweeps. They begin with the radius that their
- * strength suggests instead of the same one for all. */
-static void start_at_peaks(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
-                           uint32_t sweeps)
+/* Discs at the image's peaks, moved. They begin with the radius that their strength suggests
+ * instead of the same one for all. */
+static void start_at_peaks(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     const eits_options *o = &ctx->options;
     seed(ctx, scratch, f);
@@ -103,7 +102,7 @@ static void start_at_peaks(eits_context *ctx, const eits_scratch *scratch, eits_
             f->disc[k].radius_mm = eits_expected_radius(o, &f->disc[k]);
         eits_fit_strengths(ctx, scratch, f);
     }
-    eits_fit_move_all(ctx, scratch, f, sweeps);
+    eits_fit_move_all(ctx, scratch, f, o->touch_sweeps - later(ctx));
 }
 
 /* First places. They decide what the fit ends at, so they are fitted to data that strong touches
@@ -115,7 +114,7 @@ static void begin(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
     if (o->touch_seek && o->touch_sweeps > 0) {
         eits_fit_seek(ctx, scratch, f);
     } else {
-        start_at_peaks(ctx, scratch, f, o->touch_sweeps - later(ctx));
+        start_at_peaks(ctx, scratch, f);
     }
     eits_fit_prune(ctx, scratch, f);
 }
@@ -131,13 +130,37 @@ static void finish(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
     eits_fit_prune(ctx, scratch, f);
 }
 
+/* Move a disc from its peak's pixel to the middle of the image within a seed's radius of it, along
+ * either axis; the disc gets the strength of that part of the image. */
+static void centre(const eits_context *ctx, eits_disc *disc)
+{
+    const eits_model *model = ctx->model;
+    const eits_real pixel = (eits_real)model->pixel_mm, seed_mm = ctx->options.touch_seed_radius_mm,
+                    pi = R(3.14159265358979323846);
+    const uint32_t reach = seed_mm > pixel ? (uint32_t)(seed_mm / pixel) : 1u,
+                   x = (uint32_t)((disc->x_mm - (eits_real)model->origin_x_mm) / pixel),
+                   y = (uint32_t)((disc->y_mm - (eits_real)model->origin_y_mm) / pixel);
+    eits_real sum = 0, along_x = 0, along_y = 0;
+    for (uint32_t iy = y > reach ? y - reach : 0; iy <= y + reach && iy < model->ny; ++iy) {
+        for (uint32_t ix = x > reach ? x - reach : 0; ix <= x + reach && ix < model->nx; ++ix) {
+            const uint32_t j = ctx->cell[(size_t)iy * model->nx + ix];
+            const eits_real height =
+                j == EITS_NO_PIXEL ? 0 : eits_larger(disc->polarity * ctx->solver.image[j], 0);
+            sum += height;
+            along_x = eits_fma(height, (eits_real)ix - (eits_real)x, along_x);
+            along_y = eits_fma(height, (eits_real)iy - (eits_real)y, along_y);
+        }
+    }
+    disc->x_mm = eits_fma(pixel, along_x / sum, disc->x_mm);
+    disc->y_mm = eits_fma(pixel, along_y / sum, disc->y_mm);
+    disc->change = disc->polarity * sum * pixel * pixel / (pi * seed_mm * seed_mm);
+}
+
 void eits_fit_peaks(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
-    const eits_options *o = &ctx->options;
-    f->radius_weight = o->touch_radius_weight;
-    f->data = ctx->frame.y;
-    start_at_peaks(ctx, scratch, f, o->touch_sweeps < 1 ? o->touch_sweeps : 1);
-    eits_fit_prune(ctx, scratch, f);
+    seed(ctx, scratch, f);
+    for (uint32_t k = 0; k < f->count; ++k)
+        centre(ctx, &f->disc[k]);
 }
 
 void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
