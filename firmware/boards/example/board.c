@@ -2,10 +2,7 @@
 #include "example.h"
 
 enum { WORKSPACE_BYTES = 512 * 1024, SOURCE_UA_RMS = 707 };
-#define SYSTICK_CTRL      REG32(0xE000E010u) /* Armv7-M, B3.3 and B3.2.6 */
-#define SYSTICK_RELOAD    REG32(0xE000E014u)
-#define SYSTICK_RUNS      7u
-#define SCB_AIRCR         REG32(0xE000ED0Cu)
+#define SCB_AIRCR         REG32(0xE000ED0Cu) /* Armv7-M, B3.2.6 */
 #define AIRCR_SYSRESETREQ 0x05FA0004u
 
 static _Alignas(16) uint8_t workspace[WORKSPACE_BYTES];
@@ -35,21 +32,9 @@ static void restart(void *ctx)
         ;
 }
 
-/* Each millisecond; it only ends the main loop's wait. */
-void example_tick_irq(void)
-{
-}
-
-/* An interrupt that comes just before is noticed with the next tick at the latest. */
-static void wait_for_interrupt(void *ctx)
-{
-    (void)ctx;
-    __asm volatile("wfi");
-}
-
 static const fw_system_ops system_ops = {
     .time_us = mps2_time_us,
-    .wait = wait_for_interrupt,
+    .wait = mps2_wait, /* a real board sleeps here until an interrupt */
     .lock = mps2_lock,
     .unlock = mps2_unlock,
     .feed_watchdog = nothing,
@@ -63,8 +48,6 @@ int main(void)
 {
     example_link_start();
     mps2_timebase_start();
-    SYSTICK_RELOAD = 1000u * MPS2_TICKS_A_US;
-    SYSTICK_CTRL = SYSTICK_RUNS;
     for (uint32_t bank = 0; bank < FW_BANKS; ++bank)
         (void)example_store_ops.erase(NULL, bank);
     const fw_board board = {

@@ -17,7 +17,6 @@ extern const fw_store_ops example_store_ops;
 
 void example_link_start(void);
 void example_link_irq(void);
-void example_tick_irq(void);
 
 /* For the ring: the generator's period, 0 while it is off, and since when it runs; which electrodes
  * are joined to I+, I-, V+ and V-, false: not all four. */

@@ -23,10 +23,11 @@ void example_link_start(void)
     NVIC_ISER = 1u << IRQ_UART0_RX;
 }
 
-/* It only ends the main loop's wait. */
+/* It ends the main loop's wait. */
 void example_link_irq(void)
 {
     UART_INTCLEAR = RX_IRQ;
+    mps2_wake();
 }
 
 static bool write_bytes(void *ctx, const uint8_t *bytes, size_t size)

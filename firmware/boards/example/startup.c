@@ -26,7 +26,6 @@ __attribute__((section(".vectors"),
     [5] = (const void *)fault,
     [6] = (const void *)fault,
     [14] = (const void *)mps2_later_irq,
-    [15] = (const void *)example_tick_irq,
     [CORE_VECTORS + IRQ_UART0_RX] = (const void *)example_link_irq,
     [CORE_VECTORS + IRQ_TIMER1] = (const void *)mps2_slot_irq};
 

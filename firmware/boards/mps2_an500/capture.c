@@ -41,8 +41,7 @@ static fw_status configure(void *ctx, const fw_capture_setup *setup,
 static void await_burst(void)
 {
     const int32_t wait_us = (int32_t)(capture.start_us + capture.burst_us - mps2_time_us(NULL));
-    TIMER_VALUE(TIMER_SLOT) = wait_us > 0 ? (uint32_t)wait_us * MPS2_TICKS_A_US : 1u;
-    TIMER_CTRL(TIMER_SLOT) = TIMER_ENABLE | TIMER_INTERRUPT;
+    mps2_start_slot_timer(wait_us > 0 ? (uint32_t)wait_us * MPS2_TICKS_A_US : 1u);
 }
 
 static fw_status start(void *ctx)

@@ -41,6 +41,8 @@ void mps2_timebase_start(void);
  * still. */
 void mps2_hold_time(void);
 void mps2_release_time(void);
+/* Timer 1 ends a burst so many ticks from now, or from when time goes on. */
+void mps2_start_slot_timer(uint32_t ticks);
 
 /* The whole of a file into `bytes`; 0 if there is none. Ends the program if it is longer than
  * `room`. */

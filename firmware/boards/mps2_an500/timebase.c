@@ -45,6 +45,19 @@ void mps2_hold_time(void)
     mps2_unlock(NULL, state);
 }
 
+/* It begins when time goes on. A slot's interrupt may come just after time was held, and without
+ * this the scan would go on while the main loop waits to send a frame, and write into that frame.
+ */
+void mps2_start_slot_timer(uint32_t ticks)
+{
+    const uint32_t state = mps2_lock(NULL), runs = TIMER_ENABLE | TIMER_INTERRUPT;
+    TIMER_VALUE(TIMER_SLOT) = ticks;
+    slot_timer_was = runs;
+    if (held == 0)
+        TIMER_CTRL(TIMER_SLOT) = runs;
+    mps2_unlock(NULL, state);
+}
+
 void mps2_release_time(void)
 {
     const uint32_t state = mps2_lock(NULL);
