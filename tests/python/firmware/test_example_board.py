@@ -105,7 +105,6 @@ def far(raw: RawFrame, first: RawFrame) -> bool:
     return bool(np.abs(raw.voltage_v - first.voltage_v).max() > 20 * LSB_V)
 
 
-@pytest.mark.long("the build of its image; the drivers and the firmware on the other boards")
 def test_it_is_an_instrument(cortex_m7):
     check(cortex_m7 / "firmware" / "eitskin_example.elf", "mps2-an500")
 
