@@ -18,7 +18,7 @@ enum {
     PACKED = RANK * (RANK + 1) / 2,
     FINGERS = 4,
     MAX_FRAMES = 10,
-    FAST_BYTES = 1 << 15
+    FAST_BYTES = 1 << 17
 };
 static const double PIXEL = 6;
 

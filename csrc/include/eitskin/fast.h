@@ -35,7 +35,7 @@ extern "C" {
 #endif
 
 /* The maximum of tracked touches, and of rows per drive. */
-#define EITS_FAST_TOUCHES 5u
+#define EITS_FAST_TOUCHES 6u
 #define EITS_FAST_ROWS    32u
 
 /* A touch at the time of the middle of the last drive. */
@@ -66,8 +66,8 @@ typedef struct eits_fast eits_fast;
 
 /* ---- What its size is made of ---- */
 
-/* Drives that may wait for an explanation. */
-#define EITS_FAST_WAITING 9u
+/* The last drives, of which some wait for an explanation. */
+#define EITS_FAST_WAITING 14u
 
 /* Numbers of a touch's state: x, y, strength and two speeds; and of a row's answer to a touch: the
  * answer, and its derivatives by x and y. */
@@ -77,67 +77,104 @@ typedef struct eits_fast eits_fast;
 /* All touches' states; with their covariance. */
 #define EITS_FAST_STATES (EITS_FAST_TOUCHES * EITS_FAST_STATE_NUMBERS)
 
-/* One drive contributes 22 numbers to one fit: each waiting drive has two such sets, and each of
- * three fits has one per waiting drive and 30 numbers of its own. */
-#define EITS_FAST_FIT_NUMBERS ((2u + 3u) * EITS_FAST_WAITING * 22u + 3u * 30u)
+/* Touches of a hypothesis; numbers by which they move; and how many hypotheses are kept, each with
+ * its normal equations. */
+#define EITS_FAST_BODIES       3u
+#define EITS_FAST_BODY_NUMBERS (4u * EITS_FAST_BODIES)
+#define EITS_FAST_TRIALS       12u
+#define EITS_FAST_TRIAL_NUMBERS \
+    (EITS_FAST_BODY_NUMBERS * (EITS_FAST_BODY_NUMBERS + 3u) / 2u + 8u * EITS_FAST_BODIES + 26u)
 
-/* Bytes of the state without its arrays: states, covariance and fits; 28 numbers and 5 per touch
- * beside these; touches of frames, with 7 numbers and 4 counts each; counts and flags; pointers.
- * csrc/src/fast/fast.h asserts that it fits. */
-#define EITS_FAST_STATE                                                                      \
-    EITS_ALIGN16((EITS_FAST_STATES * (EITS_FAST_STATES + 1u) + EITS_FAST_FIT_NUMBERS + 28u + \
-                  5u * EITS_FAST_TOUCHES) *                                                  \
-                     sizeof(eits_real) +                                                     \
-                 EITS_MAX_TOUCHES * (sizeof(eits_touch) + 7u * sizeof(eits_real) + 16u) +    \
-                 EITS_FAST_TOUCHES * sizeof(eits_fast_touch) + EITS_MAX_ELECTRODES +         \
-                 116u * sizeof(uint32_t) + 40u * sizeof(void *))
+/* Bytes of the state without its arrays: states, covariance and hypotheses; numbers of touches and
+ * drives beside these; touches of frames, with 7 numbers and 4 counts each; counts and flags;
+ * pointers. csrc/src/fast/fast.h asserts that it fits. */
+#define EITS_FAST_STATE                                                                            \
+    EITS_ALIGN16(                                                                                  \
+        (EITS_FAST_STATES * (EITS_FAST_STATES + 1u) + EITS_FAST_TRIALS * EITS_FAST_TRIAL_NUMBERS + \
+         EITS_FAST_WAITING * (1u + EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS) +                 \
+         16u * EITS_FAST_TOUCHES + EITS_FAST_BODIES * 164u + 96u) *                                \
+            sizeof(eits_real) +                                                                    \
+        EITS_MAX_TOUCHES * (sizeof(eits_touch) + 7u * sizeof(eits_real) + 16u) +                   \
+        EITS_FAST_TOUCHES * sizeof(eits_fast_touch) + EITS_MAX_ELECTRODES +                        \
+        (80u + 10u * EITS_FAST_TOUCHES + 6u * EITS_FAST_WAITING + 6u * EITS_FAST_TRIALS) *         \
+            sizeof(uint32_t) +                                                                     \
+        (36u + EITS_FAST_TOUCHES + 3u * EITS_FAST_WAITING) * sizeof(void *))
 
 /* Bytes that are kept per drive: the place of its rows, and which touches were there, with their
  * places and strengths. */
-#define EITS_FAST_DRIVE (16u + EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS * sizeof(eits_real))
+#define EITS_FAST_DRIVE (24u + EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS * sizeof(eits_real))
+
+/* Pixels along a side of the fields that are kept as numbers. */
+#define EITS_FAST_KEPT_SIDE 10u
 
 /* Every second pixel along x and y is a cell of the map; and the numbers of a packed triangle. */
 #define EITS_FAST_CELLS(nx, ny)        (((size_t)(nx) + 1u) / 2u * (((size_t)(ny) + 1u) / 2u))
 #define EITS_FAST_TRIANGLE(drive_rows) ((size_t)(drive_rows) * ((size_t)(drive_rows) + 1u) / 2u)
 
-/* Every array but the drives and what each waiting drive keeps: ARRAY(place, element, count), in
- * the order in which they lie in memory, as EITS_WORKSPACE_ARRAYS (sizes.h). `place` is the member
- * of eits_fast that points to it. */
+/* Every array but the drives and what each drive of the ring and each touch keeps:
+ * ARRAY(place, element, count), in the order in which they lie in memory, as
+ * EITS_WORKSPACE_ARRAYS (sizes.h). `place` is the member of eits_fast that points to it. */
 /* clang-format off */
-#define EITS_FAST_ARRAYS(ARRAY, n_rows, drive_rows, nx, ny)                                        \
+#define EITS_FAST_ARRAYS(ARRAY, n_rows, drive_rows, n_electrodes, nx, ny)                          \
     /* the place of each row, and the pixels that are cells */                                     \
     ARRAY(row, uint16_t, n_rows)                                                                   \
     ARRAY(cell, uint16_t, EITS_FAST_CELLS(nx, ny))                                                 \
     ARRAY(masked, uint8_t, n_rows)                                                                 \
     ARRAY(used, uint8_t, drive_rows)                                                               \
     ARRAY(gain, eits_real, n_rows)                                                                 \
+    /* the model's error in each row */                                                            \
+    ARRAY(bias, eits_real, n_rows)                                                                 \
+    ARRAY(bias_variance, eits_real, n_rows)                                                        \
+    ARRAY(bias_h, eits_real, n_rows)                                                               \
+    ARRAY(rest, eits_real, n_rows)                                                                 \
     /* the rows of the present drive */                                                            \
     ARRAY(z, eits_real, drive_rows)                                                                \
     ARRAY(along, eits_real, drive_rows)                                                            \
+    ARRAY(h, eits_real, drive_rows)                                                                \
+    ARRAY(twice, eits_real, drive_rows)                                                            \
+    ARRAY(learned, eits_real, drive_rows)                                                          \
+    ARRAY(error, eits_real, drive_rows)                                                            \
     ARRAY(e, eits_real, drive_rows)                                                                \
     ARRAY(white, eits_real, drive_rows)                                                            \
     ARRAY(spare, eits_real, drive_rows)                                                            \
-    /* their answers to each touch; their covariance with the states; their own factor */          \
+    /* their answers to each touch; their covariance with the states; their own factors */         \
     ARRAY(answer, eits_real, EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS * (size_t)(drive_rows))  \
     ARRAY(moved, eits_real, EITS_FAST_STATES * (size_t)(drive_rows))                               \
     ARRAY(factor, eits_real, EITS_FAST_TRIANGLE(drive_rows))                                       \
+    ARRAY(other_factor, eits_real, EITS_FAST_TRIANGLE(drive_rows))                                 \
+    /* fields of pixels as numbers */                                                              \
+    ARRAY(kept, uint16_t, EITS_FAST_KEPT_SIDE * EITS_FAST_KEPT_SIDE)                               \
+    ARRAY(field, eits_real,                                                                        \
+          EITS_FAST_KEPT_SIDE * EITS_FAST_KEPT_SIDE * (2u * (size_t)(n_electrodes) + 4u))          \
     /* scores of a new touch in each cell: of a first touch, and of a second beside it */          \
     ARRAY(score, eits_real, EITS_FAST_CELLS(nx, ny))                                               \
-    ARRAY(pair_score, eits_real, EITS_FAST_CELLS(nx, ny))
+    ARRAY(search.pair_score, eits_real, EITS_FAST_CELLS(nx, ny))                                   \
+    /* a hypothesis' answers in a drive, what its numbers move of them, fields, what is left */    \
+    ARRAY(search.ways, eits_real, EITS_FAST_BODIES * EITS_FAST_ANSWER_NUMBERS * (size_t)(drive_rows)) \
+    ARRAY(search.column, eits_real, EITS_FAST_BODY_NUMBERS * (size_t)(drive_rows))                 \
+    ARRAY(search.fields, eits_real, EITS_FAST_BODIES * (2u * (size_t)(n_electrodes) + 4u))               \
+    ARRAY(search.rest, eits_real, drive_rows)
 
-/* Each of the EITS_FAST_WAITING drives keeps its whitened rows and the factor of its time. */
+/* Each of the EITS_FAST_WAITING drives keeps its whitened rows, the factor of its time, and the
+ * known touches' answers with their slopes. */
 #define EITS_FAST_WAITING_ARRAYS(ARRAY, drive_rows)                                                \
     ARRAY(white, eits_real, drive_rows)                                                            \
-    ARRAY(factor, eits_real, EITS_FAST_TRIANGLE(drive_rows))
+    ARRAY(factor, eits_real, EITS_FAST_TRIANGLE(drive_rows))                                       \
+    ARRAY(known, eits_real, EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS * (size_t)(drive_rows))
+
+/* Each touch has the fields at its place. */
+#define EITS_FAST_TOUCH_ARRAYS(ARRAY, n_electrodes)                                                \
+    ARRAY(field, eits_real, 2u * (size_t)(n_electrodes) + 4u)
 /* clang-format on */
 
 /* Bytes of its memory, a constant expression, for a model with `n_rows` rows in `drives` drives, of
- * which the longest has `drive_rows`, and a grid of nx x ny pixels. It is 20 kB for 16 electrodes
- * in float32. */
-#define EITS_FAST_SIZE(n_rows, drives, drive_rows, nx, ny)              \
-    (EITS_FAST_STATE +                                                  \
-     EITS_ALIGN16((size_t)(drives) * EITS_FAST_DRIVE)                   \
-         EITS_FAST_ARRAYS(EITS_ADD_BYTES, n_rows, drive_rows, nx, ny) + \
+ * which the longest has `drive_rows`, with `n_electrodes` and a grid of nx x ny pixels. It is 47 kB
+ * for 16 electrodes in float32. */
+#define EITS_FAST_SIZE(n_rows, drives, drive_rows, n_electrodes, nx, ny)              \
+    (EITS_FAST_STATE +                                                                \
+     EITS_ALIGN16((size_t)(drives) * EITS_FAST_DRIVE)                                 \
+         EITS_FAST_ARRAYS(EITS_ADD_BYTES, n_rows, drive_rows, n_electrodes, nx, ny) + \
+     EITS_FAST_TOUCHES * (0u EITS_FAST_TOUCH_ARRAYS(EITS_ADD_BYTES, n_electrodes)) +  \
      EITS_FAST_WAITING * (0u EITS_FAST_WAITING_ARRAYS(EITS_ADD_BYTES, drive_rows)))
 
 /* Returns the same number for an open model. One without fields (section FLDS), or with a drive of

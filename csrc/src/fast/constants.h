@@ -7,13 +7,9 @@
 
 /* clang-format off */
 
-/* ---- Chosen: on presses, swipes and pairs in time of seed 101 at 60 and 40 dB; the study reports
- * on seed 202. Some stand as in the first prototype and were not varied. Check: eitskin study
- * fast-path */
-
-/* touches that are followed. larger: memory and work grow with its square; smaller: a hand of five
- * does not fit */
-#define EITS_FAST_MAX_TOUCHES 5
+/* ---- Chosen: on presses, swipes and pairs in time of seed 101 at 60 and 40 dB, and on hands in
+ * time of seeds 31 and 32; the study reports on seed 202. Some stand as in the prototypes and were
+ * not varied. Check: eitskin study fast-path */
 
 /* greatest number in a drive [rows]. larger: memory; smaller: no skins of 32 electrodes */
 #define EITS_FAST_MAX_ROWS 32
@@ -21,10 +17,6 @@
 /* where the soft disc ends that a touch answers as [of touch_seed_radius_mm]. larger: answers near
  * the rim are smeared; smaller: they jump from pixel to pixel */
 #define EITS_FAST_SOFT_RADIUS R(1.2)
-
-/* what the model is wrong by in each row [of a touch's answer]. larger: slow to move; smaller:
- * strong touches are news in every drive */
-#define EITS_FAST_MODEL_ERROR R(0.03)
 
 /* chi^2 of a drive's rows above which they are not as expected. larger: touches come late; smaller:
  * noise starts searches */
@@ -57,13 +49,10 @@
 #define EITS_FAST_FAR R(1000000.0)
 
 /* change of speed in a drive of FAST_DRIVE_S [mm/s]. larger: places jitter; smaller: they lag */
-#define EITS_FAST_SPEED_NOISE R(40.0)
+#define EITS_FAST_SPEED_NOISE R(15.0)
 
 /* the drive that noise is named for [s]. as the others */
 #define EITS_FAST_DRIVE_S R(0.0013)
-
-/* of a new touch [mm/s]. as FAST_SPEED_NOISE */
-#define EITS_FAST_FIRST_SPEED R(150.0)
 
 /* change of strength in such a drive [of the greatest]. larger: strengths jitter; smaller: at 40 dB
  * a touch that lifts slides to where it would be weak */
@@ -75,9 +64,6 @@
 /* the same before anything new is looked for [of the greatest]. larger: new touches near others are
  * taken for them; smaller: a lift looks like a new touch */
 #define EITS_FAST_CHANGE R(1.0)
-
-/* change of place with it, where nothing waits [mm]. as FAST_CHANGE */
-#define EITS_FAST_CHANGE_MM R(3.0)
 
 /* of what a drive says of the gain's drift that is believed. larger: drift follows noise; smaller:
  * it lags */
@@ -105,83 +91,17 @@
  * they are born */
 #define EITS_FAST_DRIFTED_FRAMES 2
 
-/* that wait to be explained [drives]. larger: memory and work; smaller: misses touches at 40 dB */
-#define EITS_FAST_HELD 9
-
 /* chi^2 above which the first drive that waits is left out: a touch may have landed within it.
  * larger: sudden presses are placed by halves of drives; smaller: slow ones come later */
 #define EITS_FAST_SUDDEN R(400.0)
-
-/* after which a wait begins again [drives]. larger: the map keeps what has passed; smaller: slow
- * touches begin again */
-#define EITS_FAST_MAX_WAIT 24
 
 /* without news end a wait [drives]. larger: old drives are kept; smaller: light touches begin
  * again */
 #define EITS_FAST_QUIET 8
 
-/* of the last 32; with more nothing is born [drives]. larger: faults make touches; smaller: slow
- * touches wait for a frame */
-#define EITS_FAST_UNEXPLAINED 20
-
-/* of the map that a search begins at [places]. larger: work; smaller: no rival to be compared
- * with */
-#define EITS_FAST_STARTS 2
-
-/* of a search, at most [steps]. larger: work; smaller: places lag */
-#define EITS_FAST_STEPS 5
-
-/* answered for by the steps of a search: bounds its work [drives]. as FAST_STEPS */
-#define EITS_FAST_ANSWERS 12
-
-/* that two touches at once are looked for in [drives]. larger: work; smaller: pairs come late */
-#define EITS_FAST_PAIR_HELD 3
-
-/* the map beside a first touch is made of [drives]. larger: work; smaller: misses the second */
-#define EITS_FAST_PAIR_DRIVES 1
-
 /* between touches, and between a place and its rivals [mm]. larger: near fingers wait for a frame;
  * smaller: one touch becomes two */
 #define EITS_FAST_APART_MM R(15.0)
-
-/* of a step [of the diagonal]. larger: slow; smaller: steps run away */
-#define EITS_FAST_DAMPING R(0.001)
-
-/* longest step [mm]. as FAST_DAMPING */
-#define EITS_FAST_MAX_STEP_MM R(6.0)
-
-/* a step that does not help is made so much shorter. as FAST_DAMPING */
-#define EITS_FAST_SHORTER R(0.25)
-
-/* a shorter step ends a search [mm]. larger: places are rough; smaller: work */
-#define EITS_FAST_SETTLED_MM R(0.05)
-
-/* least pivot of normal equations of unit diagonal. larger: places that rows tell are refused;
- * smaller: places that noise tells are believed */
-#define EITS_FAST_SINGULAR R(1e-06)
-
-/* what a touch must explain of chi^2. larger: misses light touches; smaller: noise is born */
-#define EITS_FAST_BIRTH R(45.0)
-
-/* rms of what it may leave beside noise [of the signal]. larger: two touches are born as one
- * between them; smaller: none that the model does not fit */
-#define EITS_FAST_BIRTH_ERROR R(0.05)
-
-/* of that noise, above its mean [deviations]. as FAST_BIRTH_ERROR; larger: a second touch is looked
- * for late, smaller: in vain */
-#define EITS_FAST_LEFT_SD R(2.0)
-
-/* greatest deviation of its place [mm]. larger: wrong first places; smaller: late */
-#define EITS_FAST_SPREAD_MM R(1.8)
-
-/* lead over the best rival place [of what it explains]. larger: late; smaller: false touches */
-#define EITS_FAST_AMBIGUOUS R(0.05)
-
-/* added to the deviation of a new place [mm]. larger: jitter; smaller: wrong places stay */
-#define EITS_FAST_BORN_MM R(0.5)
-
-/* added to the deviation of a new strength [of it]. as FAST_BORN_MM */
-#define EITS_FAST_BORN_STRENGTH R(0.1)
 
 /* below it a touch is off [of the greatest strength]. larger: touches end early; smaller: late */
 #define EITS_FAST_OFF R(0.15)
@@ -214,9 +134,6 @@
  * larger: faults are named late; smaller: slow presses name faults */
 #define EITS_FAST_FRAMES 1
 
-/* from a touch to that of a frame that confirms it [mm]. as FAST_APART_MM */
-#define EITS_FAST_CONFIRM_MM R(15.0)
-
 /* without it, after which a touch goes [frames]. larger: false touches last; smaller: one bad frame
  * ends true ones */
 #define EITS_FAST_LOST_FRAMES 2
@@ -227,44 +144,98 @@
 /* the same of its strength [of it]. as FAST_BORN_MM */
 #define EITS_FAST_SEED_STRENGTH R(0.3)
 
-/* ---- Chosen: on tuning streams, whose seed and runs were not kept, for a whole-frame tracker that
- * smoothed places as well. Check: eitskin study hands */
+/* touches that are followed. larger: memory and work grow with its square; smaller: a hand of five
+ * and a wrong one do not fit */
+#define EITS_FAST_MAX_TOUCHES 6
 
-/* a touch of frames alone that explains less waits for a second one: it may be half of another [of
- * |y|^2]. larger: light touches start late; smaller: halves are reported */
-#define EITS_FAST_SURE_FRACTION R(0.05)
+/* that wait to be explained [drives]. larger: memory and work; smaller: misses touches at 40 dB */
+#define EITS_FAST_HELD 8
 
-/* and one whose own S'y is less [lambda_noise]. larger: faint touches start late; smaller: noise is
- * reported at once */
-#define EITS_FAST_SURE_CLEARNESS R(1.5)
+/* that are kept: a search of those that wait may take the rest [drives]. larger: memory; smaller:
+ * long searches begin again */
+#define EITS_FAST_RING 14
 
-/* that may lack a touch before its id ends [frames]. larger: another finger gets its id; smaller: a
- * faint touch loses its id */
-#define EITS_FAST_SEEN_HOLD 2
+/* touches nearer than its root do not bend each other's field [mm^2]. as NO_DIPOLE_MM2 */
+#define EITS_FAST_NO_DIPOLE_MM2 R(1e-06)
 
-/* a faint touch found so often is reported while it is missed [frames]. larger: faint touches
- * flicker; smaller: noise is held */
-#define EITS_FAST_SEEN_KNOWN 4
+/* what the model is wrong by in each row, unless it is learned [of a touch's answer]. larger: slow
+ * to move; smaller: strong touches are news in every drive */
+#define EITS_FAST_MODEL_ERROR R(0.02)
 
-/* how far a touch that is not reported yet may move: noise is found anywhere, a touch beside itself
- * [of follow_mm]. larger: noise confirms noise; smaller: fast fingers start late */
-#define EITS_FAST_SEEN_REACH R(0.6)
+/* what it is wrong by in each row beside that [of the rms of a drive's answer]. as
+ * FAST_MODEL_ERROR */
+#define EITS_FAST_DRIVE_ERROR R(0.01)
 
-/* rms by which a velocity changes [of follow_mm a frame]. larger: places of noise turn it; smaller:
- * turns are followed late */
-#define EITS_FAST_SEEN_CHANGE R(0.028)
+/* greatest share of what touches give now in what they gave when it was learned. larger: a press
+ * that grows takes errors along; smaller: a stronger press is news */
+#define EITS_FAST_BIAS_MOST R(1.2)
 
-/* rms of a new touch's velocity [of follow_mm a frame]. larger: the first two places decide it;
- * smaller: fast fingers are lost at first */
-#define EITS_FAST_SEEN_SPEED R(0.12)
+/* its deviation as far as touches no longer give what they gave [of the learned error]. as
+ * FAST_BIAS_MOST */
+#define EITS_FAST_BIAS_OLD R(0.2)
 
-/* deviation of the place of a touch that is as clear as noise [pixels]. larger: velocities follow
- * late; smaller: noise makes velocities */
-#define EITS_FAST_SEEN_NOISE R(0.66)
+/* least share of what is left that is learned. larger: noise is learned; smaller: late */
+#define EITS_FAST_BIAS_LEAST R(0.2)
 
-/* no place is better known than this [pixels]. larger: as FAST_SEEN_NOISE; smaller: a gain of
- * rounding */
-#define EITS_FAST_SEEN_DEVIATION R(0.01)
+/* age of each touch from which on errors are learned [drives]. larger: late; smaller: a wrong place
+ * is learned as an error */
+#define EITS_FAST_BIAS_AGE 16
+
+/* without news before errors are learned [drives]. as FAST_BIAS_AGE */
+#define EITS_FAST_BIAS_QUIET 6
+
+/* deviation of what is left of a row from one scan to the next that is a model's error [of it].
+ * larger: slow touches are learned away; smaller: errors are news for ever */
+#define EITS_FAST_SAME_REST R(0.1)
+
+/* with more news nothing is a model's error at once [of 16 drives]. as FAST_SAME_REST */
+#define EITS_FAST_FEW_NEWS 5
+
+/* change of a still touch's place in a drive [mm]. larger: places jitter; smaller: they stay
+ * wrong */
+#define EITS_FAST_STILL_MM R(0.03)
+
+/* a moving touch that goes less in FAST_SLOW_DRIVES is still [mm]. larger: slow fingers stand
+ * still; smaller: still ones are dragged by those that land */
+#define EITS_FAST_SLOW_MM R(0.35)
+
+/* after which that is asked [drives]. larger: still touches are dragged; smaller: as FAST_SLOW_MM
+ * larger */
+#define EITS_FAST_SLOW_DRIVES 10
+
+/* a moving touch stands still once so many of the last drives, a bit each, are unexplained [bits].
+ * larger: a wrong speed carries it away; smaller: a swipe lags behind a touch that lands */
+#define EITS_FAST_COASTS 15
+
+/* whose chi^2 together may be news [drives]. larger: late; smaller: noise waits */
+#define EITS_FAST_SUM_DRIVES 8
+
+/* of that above their rows; the model's error is learned below half of it. larger: slow motion is
+ * seen late; smaller: noise waits */
+#define EITS_FAST_SUM_MOST R(60.0)
+
+/* by which a birth must be further from it [of a wider disc's end]. larger: a finger beside a palm
+ * is refused; smaller: touches at its rim */
+#define EITS_FAST_APART_WIDE R(0.7)
+
+/* from a touch to that of a frame that confirms it; further away in two frames that agree it is put
+ * there [mm]. larger: places of drives stay wrong; smaller: places of frames cut in */
+#define EITS_FAST_AGREE_MM R(6.0)
+
+/* between a touch's places in two frames from which on it moves when it is put [mm]. larger: moving
+ * touches lag; smaller: still ones run away */
+#define EITS_FAST_PUT_MOVES_MM R(2.0)
+
+/* that it has gone on for since the middle of the frame's scan [frames]. the frame is taken into
+ * account when the next one is complete */
+#define EITS_FAST_PUT_AHEAD R(1.5)
+
+/* deviation of its speed then [mm/s]. as FAST_MOVED_DOUBT_SPEED */
+#define EITS_FAST_PUT_SPEED R(100.0)
+
+/* between touches of two frames on end that no drive has found [mm]. larger: two wrong frames make
+ * a touch; smaller: late */
+#define EITS_FAST_SEED_REACH_MM R(8.0)
 
 /* clang-format on */
 

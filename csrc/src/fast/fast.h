@@ -6,10 +6,11 @@
 #include "context/context.h"
 #include "eitskin/fast.h"
 #include "fast/constants.h"
+#include "search/trial.h"
 
 _Static_assert(EITS_FAST_MAX_TOUCHES == EITS_FAST_TOUCHES, "the header's");
 _Static_assert(EITS_FAST_MAX_ROWS == EITS_FAST_ROWS, "the header's");
-_Static_assert(EITS_FAST_HELD == EITS_FAST_WAITING, "the header's");
+_Static_assert(EITS_FAST_RING == EITS_FAST_WAITING, "the header's");
 
 /* A touch's place in the state: x, y, strength, and speeds. */
 enum { FAST_X = 0, FAST_Y = 1, FAST_C = 2, FAST_VX = 3, FAST_VY = 4 };
@@ -22,20 +23,34 @@ typedef struct fast_drive {
     uint16_t first, count; /* in `row` */
     uint8_t plus, minus;
     uint8_t explained; /* when it was last measured */
-    uint8_t reserved;
+    uint8_t learned;   /* an error of the model in its rows */
+    uint32_t rest_at;  /* the count of drives when `rest` of its rows was kept */
     /* by touch: 1 where it was there then, and x, y, strength */
     uint8_t there[EITS_FAST_MAX_TOUCHES];
     eits_real then[EITS_FAST_MAX_TOUCHES][FAST_WAYS];
 } fast_drive;
 
+/* What a place sees: the mean over its disc of each electrode's field (x of each, then y) and of
+ * the mirror's four numbers; two such places are enough for what two touches do to each other. */
+typedef struct fast_sight {
+    eits_real *field;
+    eits_real z[2], radius;
+} fast_sight;
+
 /* A touch beside its state. */
 typedef struct fast_known {
     uint32_t id;
-    uint32_t on, off_drives, frames_missed, confirmed;
+    uint32_t on, off_drives, age; /* age: drives since it was born or put elsewhere */
+    uint32_t moving, slow;        /* it has a speed; drives on end that it was slow */
+    uint32_t frames_missed, confirmed;
     uint32_t aligned; /* it was there when a frame was last aligned, and where */
     eits_real at[2];
-    eits_real energy; /* mean of what it explains of a drive's chi^2 */
-    eits_real peak;   /* its greatest strength */
+    uint32_t is_elsewhere; /* the last frame had it at `elsewhere` */
+    eits_real elsewhere[2];
+    eits_real anchor[2]; /* where it was `slow` drives ago */
+    eits_real energy;    /* mean of what it explains of a drive's chi^2 */
+    eits_real peak;      /* its greatest strength */
+    eits_real rho2;      /* square of where its soft disc ends, mm^2 */
 } fast_known;
 
 /* A touch that frames show and no drive follows (report.c). */
@@ -50,39 +65,19 @@ typedef struct fast_seen {
     uint32_t faint;  /* 1: it was fainter than noise when it was last found */
 } fast_seen;
 
-/* What one drive says of touches at places: how it is explained, and how to move them. */
-typedef struct fast_share {
-    eits_real strength[2], variance[2];
-    eits_real left, score; /* of its chi^2, and explained of it */
-    eits_real own[2];      /* what each explains beside the other */
-    eits_real b[4], h[10]; /* normal equations, h by rows up to the diagonal */
-} fast_share;
-
-/* A drive that waits: rows and the triangle that whitened them, in memory of its own; and what it
- * said of the places that the last search came to, bits in `said`. */
+/* A drive of the ring: rows, the triangle that whitens them, the known touches' answers with their
+ * slopes, and their states then. Once it is `ready`, rows and answers are whitened, with strengths
+ * free to change. */
 typedef struct fast_held {
-    eits_real *white, *factor;
+    eits_real *white, *factor, *known;
+    uint32_t time_us;
+    uint32_t used; /* a bit for each row in use */
     uint16_t drive, rows;
-    uint32_t used;  /* a bit for each row in use */
-    uint8_t alone;  /* no touch was known */
-    uint8_t sudden; /* much is unexplained: if it waits first, a touch may have landed within it */
-    uint8_t said;
-    fast_share share[EITS_FAST_STARTS];
+    uint8_t count;                       /* touches that were known */
+    uint8_t ready, loose, mapped, plain; /* loose: strengths are free in the factor already */
+    eits_real chi2;
+    eits_real state[EITS_FAST_MAX_TOUCHES][FAST_WAYS];
 } fast_held;
-
-/* Touches as they explain drives that wait. */
-typedef struct fast_fit {
-    uint32_t count; /* of touches: 1 or 2 */
-    eits_real place[2][2];
-    fast_share share[EITS_FAST_HELD]; /* by drives that wait; and their sums: */
-    eits_real left_all, score, own[2];
-    eits_real h[4][4], b[4];
-    eits_real variance[2]; /* of the strengths in the last drive */
-} fast_fit;
-
-/* What the next search is for: a drive's work is bounded, so that two touches at once take three.
- */
-typedef enum fast_stage { FAST_ONE, FAST_BESIDE, FAST_TWO } fast_stage;
 
 struct eits_fast {
     const eits_context *ctx;
@@ -97,9 +92,12 @@ struct eits_fast {
     eits_real drift;  /* of the gain */
     uint32_t drifted; /* frames on end that it was far */
     uint32_t time_us, timed, begun, next_id;
-    uint32_t unexplained; /* a bit for each of the last 32 drives */
-    uint32_t unexplained_frames;
-    uint32_t glitched, changed;           /* in the last drive; within this one */
+    uint32_t drive_count;
+    uint32_t unexplained, newsy; /* a bit for each of the last 32 drives */
+    uint32_t unexplained_frames, frame_explained;
+    uint32_t aligned_us; /* when a frame was last aligned, and how long after the one before */
+    eits_real frame_s;
+    uint32_t glitched;                    /* in the last drive */
     uint32_t fresh;                       /* begun since a frame was last aligned */
     uint32_t stirred, next_aligned;       /* touches changed in that frame; next_id as it was */
     uint32_t named, named_before;         /* diagnostics of the last two solved frames */
@@ -112,50 +110,75 @@ struct eits_fast {
     uint32_t n_followed;
     fast_seen seen[EITS_MAX_TOUCHES];
     eits_fast_touch followed[EITS_FAST_MAX_TOUCHES];
-    /* tracks */
+    /* tracks; strengths are above zero whatever the touches' sign */
     uint32_t count;
     fast_known known[EITS_FAST_MAX_TOUCHES];
     eits_real state[FAST_NUMBERS];
     eits_real p[FAST_NUMBERS][FAST_NUMBERS];
-    /* a drive's rows at hand, most_rows numbers each */
-    eits_real *z, *along, *e, *white, *spare;
+    fast_sight sight[EITS_FAST_MAX_TOUCHES];
+    /* a drive's rows at hand, most_rows numbers each: measured; along a drift; expected of touches;
+     * their interplay, which each of two touches' answers has; of the model's error, what is
+     * learned and the variance of the rest */
+    eits_real *z, *along, *h, *twice, *learned, *error;
+    eits_real *e, *white, *spare;
     uint8_t *used;
-    eits_real *answer; /* by touch and way */
-    eits_real *moved;  /* P H', FAST_NUMBERS a row */
-    eits_real *factor; /* a triangle: S = L L' */
-    /* births */
-    uint32_t held_count, quiet, waited, last_count;
-    fast_stage stage;
-    uint32_t turn; /* of which start has the step that is left over */
-    fast_held held[EITS_FAST_HELD];
-    fast_fit fit[EITS_FAST_STARTS], trial;
-    eits_real *score, *pair_score; /* by cell */
-    eits_real first[2], last[EITS_FAST_STARTS][2];
+    uint16_t *kept; /* which pixel's fields are in each place of `field`, + 1 */
+    eits_real *field;
+    eits_real *answer;                /* by touch and way */
+    eits_real *moved;                 /* P H', FAST_NUMBERS a row */
+    eits_real *factor, *other_factor; /* triangles: S = L L' */
+    /* the model's error, n_rows each, drive by drive: learned, its variance, what touches gave the
+     * row when it was learned; and what was left of it when it last was news */
+    eits_real *bias, *bias_variance, *bias_h, *rest;
+    /* drives: the last ones; those of them that wait for an explanation; quiet ones on end */
+    uint32_t ring_count, held_count, quiet;
+    fast_held ring[EITS_FAST_RING];
+    eits_real
+        chi2[EITS_FAST_SUM_DRIVES]; /* of the last drives above their rows, the oldest first */
+    uint32_t chi2_count;
+    eits_real *score; /* by cell: what a new touch there would explain */
+    fast_search search;
     uint32_t seeds;
     eits_real seed[EITS_FAST_MAX_TOUCHES][2];
 };
 
 _Static_assert(sizeof(fast_drive) <= EITS_FAST_DRIVE, "the header counts it");
 _Static_assert(sizeof(struct eits_fast) <= EITS_FAST_STATE, "the header counts it");
-_Static_assert(sizeof(struct eits_fast) + 256 > EITS_FAST_STATE, "the header counts too much");
+_Static_assert(sizeof(struct eits_fast) + 512 > EITS_FAST_STATE, "the header counts too much");
 
 static inline eits_real fast_square(eits_real value)
 {
     return value * value;
 }
 
+/* Four at a time, in their order: half of the instructions of a plain loop on a small processor. */
 static inline eits_real fast_dot(const eits_real *a, const eits_real *b, uint32_t count)
 {
     eits_real sum = 0;
+    for (; count >= 4; count -= 4, a += 4, b += 4) {
+        sum = eits_fma(a[0], b[0], sum);
+        sum = eits_fma(a[1], b[1], sum);
+        sum = eits_fma(a[2], b[2], sum);
+        sum = eits_fma(a[3], b[3], sum);
+    }
     for (uint32_t i = 0; i < count; ++i)
-        sum += a[i] * b[i];
+        sum = eits_fma(a[i], b[i], sum);
     return sum;
 }
 
 static inline void fast_axpy(eits_real *out, eits_real factor, const eits_real *a, uint32_t count)
 {
+    for (; count >= 4; count -= 4, a += 4, out += 4) {
+        const eits_real first = eits_fma(factor, a[0], out[0]);
+        const eits_real second = eits_fma(factor, a[1], out[1]);
+        const eits_real third = eits_fma(factor, a[2], out[2]);
+        out[3] = eits_fma(factor, a[3], out[3]);
+        out[0] = first;
+        out[1] = second;
+        out[2] = third;
+    }
     for (uint32_t i = 0; i < count; ++i)
-        out[i] += factor * a[i];
+        out[i] = eits_fma(factor, a[i], out[i]);
 }
 
 /* Row i of a triangle by rows. */
@@ -185,74 +208,105 @@ static inline void fast_whiten(eits_real *factor, eits_real *v, uint32_t count)
     }
 }
 
+/* Of two places, squared. */
+static inline eits_real fast_distance2(const eits_real *a, const eits_real *b)
+{
+    const eits_real dx = a[0] - b[0], dy = a[1] - b[1];
+    return dx * dx + dy * dy;
+}
+
 /* Whether two places are further from each other than EITS_FAST_APART_MM. */
 static inline int fast_apart(const eits_real *a, const eits_real *b)
 {
-    const eits_real dx = a[0] - b[0], dy = a[1] - b[1];
-    return dx * dx + dy * dy > fast_square(EITS_FAST_APART_MM);
+    return fast_distance2(a, b) > fast_square(EITS_FAST_APART_MM);
+}
+
+/* From one instant to another, s; the clock may wrap. */
+static inline eits_real fast_between_s(uint32_t from_us, uint32_t to_us)
+{
+    return (eits_real)(int32_t)(to_us - from_us) * R(1e-6);
+}
+
+/* How far from touch k another may be born: the more, the wider k is. */
+static inline eits_real fast_room_mm(const eits_fast *fast, uint32_t k)
+{
+    return EITS_FAST_APART_MM +
+           EITS_FAST_APART_WIDE * (eits_sqrt(fast->known[k].rho2) - eits_sqrt(fast->rho2));
 }
 
 /* ---- rows.c ---- */
 
-/* The answer of a drive's rows to a touch of strength 1 at a place, and its derivatives by x and y:
- * `out` has FAST_WAYS rows of most_rows numbers. 0 where no pixel is near enough; `out` is then
- * zero. */
-int eits_fast_answer(const eits_fast *fast, uint32_t drive, const eits_real *place, eits_real *out);
+/* The pixels of a touch's soft disc, which ends at the root of `rho2`; 0 where none is kept. */
+int eits_fast_gather(const eits_fast *fast, const eits_real *place, eits_real rho2,
+                     fast_disc *disc);
+/* The answer of a drive's rows to a touch of strength 1 there, and its derivatives by x and y:
+ * `out` has FAST_WAYS rows of most_rows numbers. */
+void eits_fast_answer(const eits_fast *fast, uint32_t drive, const fast_disc *disc, eits_real *out);
 /* Whether a pixel is near enough to answer. */
-int eits_fast_on_skin(const eits_fast *fast, const eits_real *place);
+int eits_fast_on_skin(const eits_fast *fast, const eits_real *place, eits_real rho2);
+
+/* Fields at a touch. */
+void eits_fast_look(const eits_fast *fast, const eits_real *place, eits_real rho2,
+                    const fast_disc *disc, fast_sight *sight);
+/* What two touches of strength 1 add to a drive's rows beside their own answers, each by bending
+ * the field at the other; times `factor` onto `out`. */
+void eits_fast_add_interplay(const eits_fast *fast, uint32_t drive, const fast_sight *a,
+                             const fast_sight *b, eits_real factor, eits_real *out);
+
+/* ---- bias.c ---- */
+
+/* Answers of the known touches in a drive, what is expected of its rows, and the model's error in
+ * them as far as it is learned. */
+void eits_fast_expect(eits_fast *fast, uint32_t drive);
+/* News that was left of the same rows one scan before is the model's error, not a touch's: it is
+ * learned. 1 where it is. */
+int eits_fast_is_known_error(eits_fast *fast, uint32_t drive, eits_real chi2);
+/* What the update has left of the rows is the model's error: `strength` are the strengths before
+ * it. */
+void eits_fast_learn(eits_fast *fast, uint32_t drive, const eits_real *strength);
+void eits_fast_forget_errors(eits_fast *fast, uint32_t drive);
 
 /* ---- tracks.c ---- */
 
 /* dt on: places follow speeds, and all grows less sure. */
 void eits_fast_predict(eits_fast *fast, eits_real dt_s);
-/* Each touch may have changed by these at once, the strength as a fraction of its greatest. */
-void eits_fast_loosen(eits_fast *fast, eits_real strength, eits_real place_mm);
-/* white, e, factor and moved of z where it is used; chi^2. `answer` must be the drive's. */
+/* Each strength may have changed by this fraction of its greatest at once. */
+void eits_fast_loosen(eits_fast *fast, eits_real strength);
+/* white, e, factor and moved of z where it is used; chi^2. eits_fast_expect must be the drive's. */
 eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows);
 /* Believe the rows: `white` as it is now; `moved` is spent. */
 void eits_fast_update(eits_fast *fast, uint32_t rows);
-/* A touch with its variances, and those of its place and strength among each other. */
-void eits_fast_add(eits_fast *fast, const eits_real *state, const eits_real *variance,
-                   eits_real xy);
+/* A touch, of which nothing is known that others share; `covariance` of x, y, strength, speeds. */
+void eits_fast_add(eits_fast *fast, const eits_real *state, eits_real (*covariance)[FAST_SIZE],
+                   eits_real energy, eits_real rho2);
+/* Touch k's covariance, apart from the others'. */
+void eits_fast_set_covariance(eits_fast *fast, uint32_t k, eits_real (*covariance)[FAST_SIZE]);
+/* Touch k does not move. */
+void eits_fast_still(eits_fast *fast, uint32_t k);
 void eits_fast_forget(eits_fast *fast, uint32_t k);
-
-/* ---- frames.c ---- */
-
-/* The nearest to `place`, mm, of those found that no touch has taken, within EITS_FAST_CONFIRM_MM;
- * `count` where there is none. */
-uint32_t eits_fast_nearest(const eits_real *place, const eits_real (*found)[2],
-                           const uint8_t *taken, uint32_t count);
 
 /* ---- map.c ---- */
 
-/* A drive enters the map of what a touch at each cell would explain. */
-void eits_fast_map(eits_fast *fast, const fast_held *held);
-/* The map beside a first touch, of the newest drives that wait. */
-void eits_fast_map_beside(eits_fast *fast, const eits_real *first);
+/* A drive enters the map of what a touch at each cell would explain; `beside`: another touch's
+ * whitened answer, which is taken out, NULL for none. */
+void eits_fast_map(eits_fast *fast, const fast_held *held, const eits_real *beside,
+                   eits_real *score);
 /* The greatest cell of `score` apart from the `count` places; 0 where nothing is above zero. */
 int eits_fast_peak(const eits_fast *fast, const eits_real *score, const eits_real (*places)[2],
                    uint32_t count, eits_real *place);
 
-/* ---- births.c ---- */
+/* ---- ring.c ---- */
 
-/* The inverse of a symmetric matrix (n x n, n at most 4); 0 where it is not well above zero. */
-int eits_fast_invert(const eits_real h[4][4], uint32_t n, eits_real inverse[4][4]);
-/* How `fit->place` explains the drives held from `from` on; its shares of those in the bits of
- * `known` are there. 0 where a place is off the skin. */
-int eits_fast_fit_at(eits_fast *fast, uint32_t from, uint32_t known, fast_fit *fit);
-/* The newest drive says what it does at the places that the last search came to. */
-void eits_fast_keep_up(eits_fast *fast);
-/* Looks for one touch in them, or by the map beside it for a second at `first`; the best, with its
- * lead over the next best elsewhere; NULL where there is none. Owned by this module until the next
- * search. */
-const fast_fit *eits_fast_find(eits_fast *fast, uint32_t from, const eits_real *first,
-                               eits_real *lead);
-
-/* ---- wait.c ---- */
-
-/* A drive is held until it is accounted for, as long as there is room. */
-void eits_fast_wait(eits_fast *fast, uint32_t drive, uint32_t rows, int news);
-/* Touches that explain what waits, by one search; 1 where there are. */
-int eits_fast_find_births(eits_fast *fast);
+/* The drive at hand enters the ring; it waits if it is news or others do. */
+void eits_fast_keep(eits_fast *fast, uint32_t drive, uint32_t rows, int news);
+/* A new touch's answer and its slopes, whitened as the drive is. */
+void eits_fast_whiten_ways(const fast_held *held, uint32_t stride, uint32_t rows,
+                           eits_real *answer);
+/* The drives before wait too: together they say what none of them said. */
+void eits_fast_hold_all(eits_fast *fast);
+/* Nothing waits, and the drives before are no more: touches have changed. */
+void eits_fast_empty_ring(eits_fast *fast);
+/* Touch k goes, and with it what waits: drives remember touches by their number. */
+void eits_fast_drop(eits_fast *fast, uint32_t k);
 
 #endif

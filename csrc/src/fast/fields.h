@@ -26,4 +26,44 @@ static inline void fast_two(const uint16_t *column, uint32_t e, eits_real value[
     value[1] = (eits_real)both[1];
 }
 
+/* A pixel's column in numbers: the fields and the mirror's four. It is converted once and kept
+ * until another pixel needs its place; the pixels of a touch have places apart. */
+static inline const eits_real *fast_field(const eits_fast *fast, uint32_t pixel)
+{
+    const eits_pixel *at = &fast->model->pixel[pixel];
+    const uint32_t ix = at->ix, iy = at->iy, side = FAST_CACHE_SIDE;
+    const uint32_t slot = iy % side * side + ix % side;
+    const uint32_t numbers = 2 * fast->model->n_electrodes + 4;
+    eits_real *kept = fast->field + (size_t)slot * numbers;
+    if (fast->kept[slot] != pixel + 1) {
+        const uint16_t *column = fast_column(fast, pixel);
+        for (uint32_t k = 0; k < numbers; k += 2)
+            fast_two(column, k, kept + k);
+        fast->kept[slot] = (uint16_t)(pixel + 1);
+    }
+    return kept;
+}
+
+/* Pixels whose centres may lie in a soft disc: every `every`-th of a range; in pixels from the
+ * grid's corner. */
+typedef struct fast_window {
+    uint32_t x0, x1, y0, y1, every;
+    eits_real x, y, scale;
+} fast_window;
+
+/* rows.c: 0 where no pixel of the grid is near. */
+int eits_fast_window(const eits_fast *fast, const eits_real *place, eits_real rho2,
+                     fast_window *window);
+
+/* 1 - d^2 / rho^2 of a pixel, at dx, dy pixels from the place; 0 where none is kept there. */
+static inline eits_real fast_weight(const eits_fast *fast, const fast_window *w, uint32_t ix,
+                                    uint32_t iy, uint32_t *pixel, eits_real *dx, eits_real *dy)
+{
+    *pixel = fast->ctx->cell[(size_t)iy * fast->model->nx + ix];
+    *dx = (eits_real)ix + R(0.5) - w->x;
+    *dy = (eits_real)iy + R(0.5) - w->y;
+    const eits_real left = 1 - w->scale * (*dx * *dx + *dy * *dy);
+    return *pixel == EITS_NO_PIXEL || !(left > 0) ? 0 : left;
+}
+
 #endif

@@ -57,18 +57,24 @@ static void align_touch(eits_fast *fast, uint32_t k, eits_real *aligned)
 {
     const eits_real *now = fast->state + FAST_SIZE * k;
     const size_t rows = fast->most_rows;
+    fast_disc *disc = fast->search.disc;
+    const eits_real rho2 = fast->known[k].rho2;
+    if (!eits_fast_gather(fast, now, rho2, &disc[0]))
+        return;
     for (uint32_t n = 0; n < fast->drives; ++n) {
         const fast_drive *d = &fast->drive[n];
         eits_real spare[FAST_WAYS], *before = fast->answer + FAST_WAYS * rows;
         const eits_real *then = was(d, k, now, spare);
+        if (!eits_fast_gather(fast, then, rho2, &disc[1]))
+            continue;
         /* Only the difference of two answers by the same linear model is added, so that its errors
          * largely cancel; what the touch really does to the rows stays as measured. */
-        (void)eits_fast_answer(fast, n, now, fast->answer);
-        (void)eits_fast_answer(fast, n, then, before);
+        eits_fast_answer(fast, n, &disc[0], fast->answer);
+        eits_fast_answer(fast, n, &disc[1], before);
         for (uint32_t i = 0; i < d->count; ++i) {
             const uint32_t row = fast->row[d->first + i];
             const eits_real change = now[FAST_C] * fast->answer[i] - then[FAST_C] * before[i];
-            aligned[row] += change / fast->gain[row];
+            aligned[row] += fast->sign * change / fast->gain[row];
         }
     }
 }
@@ -95,6 +101,8 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     if (fast->fresh)
         fast->named = fast->named_before = fast->drifted = 0;
     fast->fresh = 0;
+    fast->frame_s = fast_between_s(fast->aligned_us, fast->time_us);
+    fast->aligned_us = fast->time_us;
     fast->stirred = fast->glitched || fast->next_id != fast->next_aligned;
     fast->next_aligned = fast->next_id;
     for (uint32_t k = 0; k < fast->count; ++k) {
@@ -110,30 +118,46 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     int explained = fast->held_count == 0;
     for (uint32_t n = 0; n < fast->drives; ++n)
         explained &= fast->drive[n].explained;
+    fast->frame_explained = (uint32_t)explained;
     fast->unexplained_frames = explained ? 0 : fast->unexplained_frames + 1;
     fast->stirred |= !explained;
     fast->drifted = is_far(fast) ? fast->drifted + 1 : 0;
     *state = explained ? (uint32_t)EITS_FAST_EXPLAINED : 0u;
     if (explained || fast->unexplained_frames > EITS_FAST_FRAMES)
         *state |= (uint32_t)EITS_FAST_TRUSTED;
+    /* tracks that do not explain the drives are not to be trusted to bring them to one instant */
+    if (!explained)
+        eits_copy(aligned, volts, length);
     fast->aligned = 1;
     return eits_fast_touches(fast, fast->followed, EITS_FAST_MAX_TOUCHES, &fast->n_followed);
 }
 
-uint32_t eits_fast_nearest(const eits_real *place, const eits_real (*found)[2],
-                           const uint8_t *taken, uint32_t count)
+/* Pairs of touches that were aligned and of those found, the nearest first, each within the room
+ * that the touch takes; owner[n]: the touch of found n, or FAST_NONE. */
+static void match(const eits_fast *fast, const eits_real (*found)[2], uint32_t count,
+                  uint8_t *owner)
 {
-    uint32_t best = count;
-    eits_real least = fast_square(EITS_FAST_CONFIRM_MM);
-    for (uint32_t n = 0; n < count; ++n) {
-        const eits_real dx = found[n][0] - place[0], dy = found[n][1] - place[1];
-        const eits_real square = dx * dx + dy * dy;
-        if (!taken[n] && square < least) {
-            least = square;
-            best = n;
+    uint32_t taken = 0;
+    memset(owner, FAST_NONE, count);
+    for (;;) { /* at most a pair for each touch */
+        eits_real nearest = -1;
+        uint32_t from = 0, to = 0;
+        for (uint32_t k = 0; k < fast->count; ++k) {
+            for (uint32_t n = 0; n < count; ++n) {
+                const eits_real far = fast_distance2(fast->known[k].at, found[n]);
+                if (fast->known[k].aligned && (taken >> k & 1u) == 0 && owner[n] == FAST_NONE &&
+                    far < fast_square(fast_room_mm(fast, k)) && (nearest < 0 || far < nearest)) {
+                    nearest = far;
+                    from = k;
+                    to = n;
+                }
+            }
         }
+        if (nearest < 0)
+            return;
+        owner[to] = (uint8_t)from;
+        taken |= 1u << from;
     }
-    return best;
 }
 
 static void mask_named(eits_fast *fast)
@@ -148,7 +172,7 @@ static void mask_named(eits_fast *fast)
 static int near_any(const eits_real *place, const eits_real (*others)[2], uint32_t count)
 {
     for (uint32_t k = 0; k < count; ++k) {
-        if (!fast_apart(place, others[k]))
+        if (fast_distance2(place, others[k]) < fast_square(EITS_FAST_SEED_REACH_MM))
             return 1;
     }
     return 0;
@@ -157,58 +181,111 @@ static int near_any(const eits_real *place, const eits_real (*others)[2], uint32
 static int near_known(const eits_fast *fast, const eits_real *place)
 {
     for (uint32_t k = 0; k < fast->count; ++k) {
-        if (!fast_apart(place, fast->state + FAST_SIZE * k))
+        if (fast_distance2(place, fast->state + FAST_SIZE * k) < fast_square(fast_room_mm(fast, k)))
             return 1;
     }
     return 0;
 }
 
-/* The frames that found touch k have seen it in all their drives: the next one has it already. */
-static void was_there(eits_fast *fast, uint32_t k)
+/* A touch as a frame has it: still, and known in all drives as it is, since the frame has seen it
+ * in all of them. */
+static void set_by_frame(eits_fast *fast, uint32_t k, const eits_real *place, eits_real c)
 {
+    const eits_real deviation[FAST_SIZE] = {EITS_FAST_SEED_MM, EITS_FAST_SEED_MM,
+                                            EITS_FAST_SEED_STRENGTH * c, 0, 0};
+    eits_real covariance[FAST_SIZE][FAST_SIZE] = {{0}};
+    eits_real *state = fast->state + (size_t)FAST_SIZE * k;
+    for (uint32_t i = 0; i < FAST_SIZE; ++i)
+        covariance[i][i] = fast_square(deviation[i]);
+    eits_copy(state, place, 2);
+    state[FAST_C] = c;
+    state[FAST_VX] = state[FAST_VY] = 0;
+    eits_fast_set_covariance(fast, k, covariance);
+    fast->known[k].moving = fast->known[k].slow = fast->known[k].age = 0;
+    fast->known[k].confirmed = 1;
     for (uint32_t n = 0; n < fast->drives; ++n) {
         fast->drive[n].there[k] = 1;
-        eits_copy(fast->drive[n].then[k], fast->state + (size_t)FAST_SIZE * k, FAST_WAYS);
+        eits_copy(fast->drive[n].then[k], state, FAST_WAYS);
     }
+    eits_fast_empty_ring(fast);
 }
 
 /* Touches that two frames on end have found and no drive; `at`: where the modelled skin has them.
  */
 static void seed(eits_fast *fast, const eits_touch *found, const eits_real (*at)[2],
-                 const uint8_t *taken, uint32_t count)
+                 const uint8_t *owner, uint32_t count)
 {
     const uint32_t known = fast->seeds;
     eits_real before[EITS_FAST_MAX_TOUCHES][2];
     memcpy(before, fast->seed, sizeof before);
     fast->seeds = 0;
     for (uint32_t n = 0; n < count; ++n) {
-        const eits_real c = found[n].strength_s_per_m_mm2;
+        const eits_real c = fast->sign * found[n].strength_s_per_m_mm2;
+        eits_real none[FAST_SIZE][FAST_SIZE] = {{0}};
         const eits_real state[FAST_SIZE] = {at[n][0], at[n][1], c, 0, 0};
-        if (taken[n])
+        if (owner[n] != FAST_NONE || !(c > 0))
             continue;
         /* Two frames on end: in a single one, a touch that landed while it was scanned may stand at
          * a wrong place. */
-        if (!near_any(state, (const eits_real(*)[2])before, known)) {
+        if (!near_any(state, (const eits_real(*)[2])before, known) ||
+            fast->count == EITS_FAST_MAX_TOUCHES || near_known(fast, state)) {
             if (fast->seeds < EITS_FAST_MAX_TOUCHES)
                 eits_copy(fast->seed[fast->seeds++], state, 2);
             continue;
         }
-        if (fast->count == EITS_FAST_MAX_TOUCHES || near_known(fast, state))
-            continue;
-        const eits_real place = fast_square(EITS_FAST_SEED_MM);
-        const eits_real speed = fast_square(EITS_FAST_FIRST_SPEED);
-        const eits_real variance[FAST_SIZE] = {
-            place, place, fast_square(EITS_FAST_SEED_STRENGTH * c), speed, speed};
-        eits_fast_add(fast, state, variance, 0);
-        was_there(fast, fast->count - 1);
-        fast->known[fast->count - 1].energy = 4 * EITS_FAST_FAINT;
-        fast->known[fast->count - 1].confirmed = 1;
+        eits_fast_add(fast, state, none, 4 * EITS_FAST_FAINT, fast->rho2);
+        set_by_frame(fast, fast->count - 1, state, c);
     }
+}
+
+/* A touch that frames have elsewhere, and drives did not follow, is put where it must be by now:
+ * two frames on end also tell how it moves, from the middle of one scan to that of the next. */
+static void put(eits_fast *fast, uint32_t k, const eits_real *place, eits_real c)
+{
+    fast_known *known = &fast->known[k];
+    const eits_real by[2] = {place[0] - known->elsewhere[0], place[1] - known->elsewhere[1]};
+    const eits_real far2 = by[0] * by[0] + by[1] * by[1];
+    const int moves = known->is_elsewhere && fast->frame_s > 0 &&
+                      far2 > fast_square(EITS_FAST_PUT_MOVES_MM) &&
+                      far2 < fast_square(EITS_FAST_APART_MM);
+    eits_real now[2] = {place[0], place[1]};
+    for (uint32_t axis = 0; axis < 2 && moves; ++axis)
+        now[axis] += EITS_FAST_PUT_AHEAD * by[axis];
+    set_by_frame(fast, k, eits_fast_on_skin(fast, now, known->rho2) ? now : place, c);
+    if (!moves)
+        return;
+    const uint32_t at = FAST_SIZE * k;
+    known->moving = 1;
+    for (uint32_t axis = 0; axis < 2; ++axis) {
+        fast->state[at + FAST_VX + axis] = by[axis] / fast->frame_s;
+        fast->p[at + FAST_VX + axis][at + FAST_VX + axis] = fast_square(EITS_FAST_PUT_SPEED);
+    }
+}
+
+/* A touch that two frames on end show elsewhere is put there. If drives explain a frame, a touch
+ * that moves is theirs; if they do not, it may have gone on between the two frames. */
+static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_real c)
+{
+    fast_known *known = &fast->known[k];
+    const eits_real near = fast_square(EITS_FAST_AGREE_MM);
+    known->frames_missed = 0;
+    if (fast_distance2(place, known->at) < near) {
+        known->confirmed = 1;
+        known->is_elsewhere = 0;
+        return;
+    }
+    const eits_real reach = fast->frame_explained ? EITS_FAST_AGREE_MM : EITS_FAST_APART_MM;
+    const int again =
+        known->is_elsewhere && fast_distance2(place, known->elsewhere) < fast_square(reach);
+    if (again && !(known->moving && fast->frame_explained))
+        put(fast, k, place, c);
+    known->is_elsewhere = 1;
+    eits_copy(known->elsewhere, place, 2);
 }
 
 eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t count)
 {
-    uint8_t taken[EITS_MAX_TOUCHES] = {0};
+    uint8_t owner[EITS_MAX_TOUCHES];
     /* The comparison is with where touches were when the frame was aligned: a swipe at 600 mm/s is
      * 6 mm further after a solve of 10 ms. */
     if (fast == NULL || (found == NULL && count > 0) || count > EITS_MAX_TOUCHES)
@@ -220,22 +297,26 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
         eits_place_in_model(fast->ctx, at[n]);
     }
     mask_named(fast);
+    match(fast, (const eits_real(*)[2])at, count, owner);
+    uint32_t seen = 0;
+    for (uint32_t n = 0; n < count; ++n) {
+        if (owner[n] == FAST_NONE)
+            continue;
+        seen |= 1u << owner[n];
+        correct(fast, owner[n], at[n], fast->sign * found[n].strength_s_per_m_mm2);
+    }
     for (uint32_t k = fast->count; k-- > 0;) {
         fast_known *known = &fast->known[k];
-        if (!known->aligned) /* it came after that frame */
+        if (!known->aligned || (seen >> k & 1u) != 0 || !known->on)
             continue;
-        known->aligned = 0;
-        const uint32_t n = eits_fast_nearest(known->at, (const eits_real(*)[2])at, taken, count);
-        if (n < count) {
-            taken[n] = 1;
-            known->confirmed = 1;
-            known->frames_missed = 0;
-        } else if (++known->frames_missed >= EITS_FAST_LOST_FRAMES && known->on) {
-            eits_fast_forget(fast, k);
-        }
+        known->is_elsewhere = 0;
+        if (++known->frames_missed >= EITS_FAST_LOST_FRAMES)
+            eits_fast_drop(fast, k);
     }
+    for (uint32_t k = 0; k < fast->count; ++k)
+        fast->known[k].aligned = 0;
     /* a frame with rows that are no touch's may show any */
-    seed(fast, found, (const eits_real(*)[2])at, taken, fast->wild == 0 ? count : 0);
+    seed(fast, found, (const eits_real(*)[2])at, owner, fast->wild == 0 ? count : 0);
     fast->wild = 0;
     return EITS_OK;
 }

@@ -41,13 +41,12 @@ static void whiten_back(eits_real *factor, eits_real *u, uint32_t rows)
     }
 }
 
-/* What is the same for all cells. `known`: a touch's answer, NULL for none; rows that are not in
- * use become zero. */
-static void look_at(eits_fast *fast, const fast_held *held, eits_real *known, sight *s)
+/* What is the same for all cells. `beside`: a touch's whitened answer, NULL for none. */
+static void look_at(eits_fast *fast, const fast_held *held, const eits_real *beside, sight *s)
 {
     const fast_drive *d = &fast->drive[held->drive];
     const eits_real volts = (eits_real)fast->model->fields.volts;
-    eits_real *left = fast->spare, *own = fast->e;
+    eits_real *left = fast->spare, *own = fast->search.rest;
     s->plus = d->plus;
     s->minus = d->minus;
     s->rows = d->count;
@@ -60,19 +59,13 @@ static void look_at(eits_fast *fast, const fast_held *held, eits_real *known, si
         s->measured[i] = eits_row(fast->ctx, fast->row[d->first + i]) + 2;
         s->of[i][0] = s->f + s->measured[i][0];
         s->of[i][1] = s->f + s->measured[i][1];
-        if (known != NULL && !used)
-            known[i] = 0;
-        own[i] = known == NULL ? 0 : known[i] * per * per;
     }
-    if (known != NULL) {
-        eits_real *white = fast->white;
-        eits_copy(white, known, s->rows);
-        s->energy = fast_dot(own, known, s->rows);
+    s->energy = beside == NULL ? 0 : fast_dot(beside, beside, s->rows);
+    if (s->energy > 0) {
+        fast_axpy(left, -(fast_dot(beside, left, s->rows) / s->energy), beside, s->rows);
+        eits_copy(own, beside, s->rows);
+        whiten_back(held->factor, own, s->rows);
         over_electrodes(fast, s, own, s->shared);
-        fast_whiten(held->factor, white, s->rows);
-        const eits_real energy = fast_dot(white, white, s->rows);
-        if (energy > 0)
-            fast_axpy(left, -(fast_dot(white, left, s->rows) / energy), white, s->rows);
     }
     whiten_back(held->factor, left, s->rows);
     over_electrodes(fast, s, left, s->toward);
@@ -88,43 +81,29 @@ static eits_real explained(const eits_fast *fast, sight *s, uint32_t pixel)
     for (uint32_t e = 0; e < electrodes; e += 2) {
         fast_two(x, e, of_x);
         fast_two(y, e, of_y);
-        f[e] = along_x * of_x[0] + along_y * of_y[0];
-        f[e + 1] = along_x * of_x[1] + along_y * of_y[1];
-        along += f[e] * s->toward[e];
-        along += f[e + 1] * s->toward[e + 1];
+        f[e] = eits_fma(along_x, of_x[0], along_y * of_y[0]);
+        f[e + 1] = eits_fma(along_x, of_x[1], along_y * of_y[1]);
+        along = eits_fma(f[e], s->toward[e], along);
+        along = eits_fma(f[e + 1], s->toward[e + 1], along);
     }
-    along *= fast->sign;
     if (!(along > 0))
         return 0;
     for (uint32_t i = 0; i < s->rows; ++i)
-        own += s->weight[i] * fast_square(*s->of[i][0] - *s->of[i][1]);
+        own = eits_fma(s->weight[i], fast_square(*s->of[i][0] - *s->of[i][1]), own);
     if (s->energy > 0)
         own -= fast_square(fast_dot(f, s->shared, electrodes)) / s->energy;
     return own > 0 ? along * along / own : 0;
 }
 
-static void add_cells(eits_fast *fast, const fast_held *held, eits_real *known, eits_real *score)
+void eits_fast_map(eits_fast *fast, const fast_held *held, const eits_real *beside,
+                   eits_real *score)
 {
     sight s;
-    look_at(fast, held, known, &s);
-    for (uint32_t n = 0; n < fast->cells; ++n)
+    look_at(fast, held, beside, &s);
+    /* where the work is limited, one half of the cells by one drive, the other by the next */
+    const uint32_t step = 2;
+    for (uint32_t n = held->drive % step; n < fast->cells; n += step)
         score[n] += explained(fast, &s, fast->cell[n]);
-}
-
-void eits_fast_map(eits_fast *fast, const fast_held *held)
-{
-    add_cells(fast, held, NULL, fast->score);
-}
-
-void eits_fast_map_beside(eits_fast *fast, const eits_real *first)
-{
-    const uint32_t from =
-        fast->held_count > EITS_FAST_PAIR_DRIVES ? fast->held_count - EITS_FAST_PAIR_DRIVES : 0;
-    eits_zero(fast->pair_score, fast->cells);
-    for (uint32_t n = from; n < fast->held_count; ++n) {
-        (void)eits_fast_answer(fast, fast->held[n].drive, first, fast->answer);
-        add_cells(fast, &fast->held[n], fast->answer, fast->pair_score);
-    }
 }
 
 /* The pixel's centre, mm. */

@@ -3,6 +3,7 @@
 #include "fast/fast.h"
 
 #include "context/places.h"
+#include "search/search.h"
 
 /* A row that no touch can have changed so: it is dead, turned over, or far above its reference. */
 static int is_wild(const eits_fast *fast, eits_real v, eits_real v0)
@@ -61,11 +62,12 @@ static uint32_t take_rows(eits_fast *fast, const fast_drive *d, const eits_real 
     for (uint32_t i = 0; i < d->count; ++i) {
         const uint32_t row = fast->row[d->first + i];
         int use = fast->used[i];
-        const eits_real z = use ? fast->gain[row] * (volts[i] - (1 + fast->drift) * v0[row]) : R(0);
+        const eits_real change = volts[i] - (1 + fast->drift) * v0[row];
+        const eits_real z = use ? fast->sign * fast->gain[row] * change : R(0);
         use = use && eits_fabs(z) < EITS_FAST_FAR * fast->sigma;
         fast->used[i] = (uint8_t)use;
         fast->z[i] = use ? z : 0;
-        fast->along[i] = use ? fast->gain[row] * v0[row] : 0;
+        fast->along[i] = use ? fast->sign * fast->gain[row] * v0[row] : 0;
         used += (uint32_t)use;
     }
     return used;
@@ -126,43 +128,113 @@ static int is_drift(eits_fast *fast, uint32_t rows)
     return 1;
 }
 
-/* What the known touches may have done at once; chi^2 as it is then. Where that does not explain
- * the rows either, the touches stay as sure as they were. */
+/* Where known strengths may have changed at once, which is allowed in two steps; chi^2 as it is
+ * then. Where that does not explain the rows either, the touches stay as sure as they were. Places
+ * are never loosened: a known touch would go to meet one that lands. */
 static eits_real with_changes(eits_fast *fast, uint32_t rows, eits_real chi2)
 {
     const eits_real strength[2] = {EITS_FAST_STRENGTH_JUMP, EITS_FAST_CHANGE};
-    const eits_real place_mm[2] = {0, EITS_FAST_CHANGE_MM};
-    eits_real kept[FAST_NUMBERS];
+    eits_real kept[EITS_FAST_MAX_TOUCHES];
+    for (uint32_t k = 0; k < fast->count; ++k)
+        kept[k] = fast->p[FAST_SIZE * k + FAST_C][FAST_SIZE * k + FAST_C];
     for (uint32_t how = 0; how < 2 && fast->count > 0 && !(chi2 < EITS_FAST_NEWS); ++how) {
-        for (uint32_t i = 0; i < FAST_SIZE * fast->count; ++i)
-            kept[i] = fast->p[i][i];
-        eits_fast_loosen(fast, strength[how], place_mm[how]);
+        for (uint32_t k = 0; k < fast->count; ++k)
+            fast->p[FAST_SIZE * k + FAST_C][FAST_SIZE * k + FAST_C] = kept[k];
+        eits_fast_loosen(fast, strength[how]);
         chi2 = eits_fast_innovate(fast, rows);
-        fast->changed = how == 1 && chi2 < EITS_FAST_NEWS; /* perhaps within the drive */
-        if (!(chi2 < EITS_FAST_NEWS)) {
-            for (uint32_t i = 0; i < FAST_SIZE * fast->count; ++i)
-                fast->p[i][i] = kept[i];
-        }
     }
+    for (uint32_t k = 0; k < fast->count && !(chi2 < EITS_FAST_NEWS); ++k)
+        fast->p[FAST_SIZE * k + FAST_C][FAST_SIZE * k + FAST_C] = kept[k];
     return chi2;
 }
 
-/* What touches explain of the rows, averaged; and a little of what is left along v0 is drift of the
- * gain. */
-static void learn(eits_fast *fast, uint32_t rows)
+/* chi^2 of the last drives beyond what noise leaves of their rows. */
+static eits_real excess(const eits_fast *fast)
 {
-    eits_real *left = fast->spare;
-    eits_copy(left, fast->z, rows);
+    eits_real sum = 0;
+    for (uint32_t n = 0; n < fast->chi2_count; ++n)
+        sum += fast->chi2[n];
+    return sum;
+}
+
+static void add_chi2(eits_fast *fast, eits_real chi2, uint32_t rows)
+{
+    if (fast->chi2_count == EITS_FAST_SUM_DRIVES) {
+        for (uint32_t n = 1; n < EITS_FAST_SUM_DRIVES; ++n)
+            fast->chi2[n - 1] = fast->chi2[n];
+        --fast->chi2_count;
+    }
+    const eits_real most = chi2 < EITS_FAST_NEWS ? chi2 : EITS_FAST_NEWS;
+    fast->chi2[fast->chi2_count++] = most - (eits_real)rows;
+}
+
+/* What touches explain of the rows, averaged; and a little of what is left along v0 is drift of the
+ * gain, unless a touch `jumped`. */
+static void learn_gain(eits_fast *fast, uint32_t rows, int jumped)
+{
     for (uint32_t k = 0; k < fast->count; ++k) {
         const eits_real *g = fast->answer + FAST_WAYS * (size_t)fast->most_rows * k;
         const eits_real c = fast->state[FAST_SIZE * k + FAST_C];
         const eits_real energy = fast_square(c / fast->sigma) * fast_dot(g, g, rows);
         fast->known[k].energy += (energy - fast->known[k].energy) / EITS_FAST_ENERGY_DRIVES;
-        fast_axpy(left, -c, g, rows);
     }
     const eits_real energy = fast_dot(fast->along, fast->along, rows);
-    if (energy > 0)
-        fast->drift += EITS_FAST_GAIN_STEP * fast_dot(fast->along, left, rows) / energy;
+    if (energy > 0 && !jumped)
+        fast->drift += EITS_FAST_GAIN_STEP * fast_dot(fast->along, fast->e, rows) / energy;
+}
+
+/* The model's error is learned where nothing happens: all touches have been there for a scan,
+ * nothing waits, and the last drives were as expected. */
+static int may_learn(const eits_fast *fast)
+{
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        if (fast->known[k].age <= EITS_FAST_BIAS_AGE)
+            return 0;
+    }
+    return fast->count > 0 && fast->held_count == 0 && fast->quiet > EITS_FAST_BIAS_QUIET &&
+           excess(fast) < EITS_FAST_SUM_MOST / 2;
+}
+
+/* The rows are as the known touches explain them. */
+static void believe(eits_fast *fast, uint32_t drive, int jumped)
+{
+    const uint32_t rows = fast->drive[drive].count;
+    eits_real before[EITS_FAST_MAX_TOUCHES];
+    for (uint32_t k = 0; k < fast->count; ++k)
+        before[k] = fast->state[FAST_SIZE * k + FAST_C];
+    learn_gain(fast, rows, jumped);
+    const int learns = !jumped && may_learn(fast);
+    eits_fast_update(fast, rows);
+    if (learns)
+        eits_fast_learn(fast, drive, before);
+    if (fast->count == 0)
+        eits_fast_forget_errors(fast, drive);
+}
+
+/* Rows that some explanation by known touches or none fits are believed; others are news, and wait
+ * for the search. Returns whether they are accounted for. */
+static int take_news(eits_fast *fast, uint32_t drive, uint32_t used, eits_real chi2, int jumped)
+{
+    const int news = !(chi2 < EITS_FAST_NEWS);
+    fast->newsy = fast->newsy << 1 | (uint32_t)news;
+    if (news && fast->count > 0 && eits_fast_is_known_error(fast, drive, chi2))
+        return 1;
+    add_chi2(fast, chi2, used);
+    const int slow = fast->chi2_count == EITS_FAST_SUM_DRIVES && excess(fast) > EITS_FAST_SUM_MOST;
+    eits_fast_keep(fast, drive, used, news);
+    if (slow && !news) {
+        fast->quiet = 0;
+        if (fast->held_count == 0)
+            eits_fast_hold_all(fast);
+    }
+    if (news)
+        return eits_search(fast);
+    if (fast->quiet >= EITS_FAST_QUIET)
+        fast->held_count = fast->search.active = 0;
+    if ((slow || fast->search.active) && eits_search(fast))
+        return 1;
+    believe(fast, drive, jumped);
+    return 1;
 }
 
 /* Believe the rows, or wait; whether they are accounted for. */
@@ -170,32 +242,37 @@ static int look(eits_fast *fast, uint32_t drive, const eits_real *volts)
 {
     const fast_drive *d = &fast->drive[drive];
     const uint32_t rows = d->count, used = take_rows(fast, d, volts);
-    for (uint32_t k = 0; k < fast->count; ++k)
-        (void)eits_fast_answer(fast, drive, fast->state + FAST_SIZE * k,
-                               fast->answer + FAST_WAYS * (size_t)fast->most_rows * k);
+    eits_fast_expect(fast, drive);
     eits_real chi2 = eits_fast_innovate(fast, rows);
-    if (chi2 < EITS_FAST_NEWS) {
+    const int calm = chi2 < EITS_FAST_NEWS;
+    if (calm) {
         fast->glitched = 0;
     } else {
         fast->glitched = (uint32_t)is_glitch(fast, rows);
-        if (fast->glitched || is_drift(fast, rows)) {
+        if (fast->glitched || (fast->count == 0 && is_drift(fast, rows))) {
             eits_fast_update(fast, rows);
             return 1;
         }
         chi2 = with_changes(fast, rows, chi2);
     }
-    const int news = !(chi2 < EITS_FAST_NEWS);
-    if (news || fast->held_count > 0)
-        eits_fast_wait(fast, drive, used, news);
-    if (news)
-        return eits_fast_find_births(fast);
-    if (fast->quiet >= EITS_FAST_QUIET)
-        fast->held_count = 0;
-    learn(fast, rows);
-    eits_fast_update(fast, rows);
-    if (fast->held_count > 1)
-        eits_fast_keep_up(fast);
-    return 1;
+    return take_news(fast, drive, used, chi2, !calm);
+}
+
+/* A touch that moves but has stayed in place for some drives is still. Its speed alone would not
+ * tell: it follows noise. */
+static void slow_down(eits_fast *fast, uint32_t k)
+{
+    fast_known *known = &fast->known[k];
+    const eits_real *place = fast->state + FAST_SIZE * k;
+    if (!known->moving || fast->held_count > 0)
+        return;
+    if (known->slow == 0)
+        eits_copy(known->anchor, place, 2);
+    if (++known->slow <= EITS_FAST_SLOW_DRIVES)
+        return;
+    known->slow = 0;
+    if (fast_distance2(known->anchor, place) < fast_square(EITS_FAST_SLOW_MM))
+        eits_fast_still(fast, k);
 }
 
 /* Which touches are on, and which have gone. */
@@ -204,7 +281,7 @@ static void update_known(eits_fast *fast)
     for (uint32_t k = fast->count; k-- > 0;) {
         fast_known *known = &fast->known[k];
         eits_real *state = fast->state + FAST_SIZE * k;
-        const eits_real strength = fast->sign * state[FAST_C];
+        const eits_real strength = state[FAST_C];
         known->peak = strength > known->peak ? strength : known->peak;
         /* Two limits, so that a touch near one does not come and go. While it is off it keeps its
          * id: a finger that bounces is the same finger. */
@@ -213,11 +290,22 @@ static void update_known(eits_fast *fast)
         else if (strength > EITS_FAST_ON * known->peak && known->energy > 2 * EITS_FAST_FAINT)
             known->on = 1;
         known->off_drives = known->on ? 0 : known->off_drives + 1;
-        if (known->off_drives > EITS_FAST_GONE || !eits_fast_on_skin(fast, state) ||
+        slow_down(fast, k);
+        if (known->off_drives > EITS_FAST_GONE || !eits_fast_on_skin(fast, state, known->rho2) ||
             !eits_all_finite(state, FAST_SIZE))
-            eits_fast_forget(fast, k);
-        else if (!known->on)
-            state[FAST_VX] = state[FAST_VY] = 0;
+            eits_fast_drop(fast, k);
+        else if (!known->on && known->moving)
+            eits_fast_still(fast, k);
+    }
+}
+
+/* A touch that has left the skin by its speed. */
+static void forget_off_skin(eits_fast *fast)
+{
+    for (uint32_t k = fast->count; k-- > 0;) {
+        ++fast->known[k].age;
+        if (!eits_fast_on_skin(fast, fast->state + FAST_SIZE * k, fast->known[k].rho2))
+            eits_fast_drop(fast, k);
     }
 }
 
@@ -236,11 +324,12 @@ eits_status eits_fast_drive(eits_fast *fast, uint32_t drive, const eits_real *vo
         eits_fast_predict(fast, (eits_real)gone_us * R(1e-6));
     fast->time_us = time_us;
     fast->timed = fast->driven = 1;
-    fast->changed = 0;
+    ++fast->drive_count;
     for (uint32_t k = 0; k < EITS_FAST_MAX_TOUCHES; ++k)
         d->there[k] = 0;
+    forget_off_skin(fast);
     const int explained = look(fast, drive, volts);
-    d->explained = (uint8_t)(explained && !fast->changed);
+    d->explained = (uint8_t)explained;
     fast->unexplained = fast->unexplained << 1 | (uint32_t)!explained;
     update_known(fast);
     for (uint32_t k = 0; k < fast->count; ++k) {
@@ -263,18 +352,18 @@ eits_status eits_fast_touches(const eits_fast *fast, eits_fast_touch *touches, u
         eits_real at[2] = {state[FAST_X], state[FAST_Y]};
         eits_place_on_skin(fast->ctx, at);
         if (known->on)
-            touches[(*count)++] = (eits_fast_touch){
-                .id = known->id,
-                .confirmed = known->confirmed,
-                .x_mm = at[0],
-                .y_mm = at[1],
-                .vx_mm_per_s = state[FAST_VX],
-                .vy_mm_per_s = state[FAST_VY],
-                .strength_s_per_m_mm2 = state[FAST_C],
-                .radius_mm = (eits_real)fast->model->defaults->touch_seed_radius_mm,
-                .x_variance_mm2 = fast->p[first + FAST_X][first + FAST_X],
-                .xy_covariance_mm2 = fast->p[first + FAST_Y][first + FAST_X],
-                .y_variance_mm2 = fast->p[first + FAST_Y][first + FAST_Y]};
+            touches[(*count)++] =
+                (eits_fast_touch){.id = known->id,
+                                  .confirmed = known->confirmed,
+                                  .x_mm = at[0],
+                                  .y_mm = at[1],
+                                  .vx_mm_per_s = state[FAST_VX],
+                                  .vy_mm_per_s = state[FAST_VY],
+                                  .strength_s_per_m_mm2 = fast->sign * state[FAST_C],
+                                  .radius_mm = eits_sqrt(known->rho2) / EITS_FAST_SOFT_RADIUS,
+                                  .x_variance_mm2 = fast->p[first + FAST_X][first + FAST_X],
+                                  .xy_covariance_mm2 = fast->p[first + FAST_Y][first + FAST_X],
+                                  .y_variance_mm2 = fast->p[first + FAST_Y][first + FAST_Y]};
     }
     return EITS_OK;
 }

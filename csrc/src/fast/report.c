@@ -175,6 +175,23 @@ void eits_fast_forget_all(eits_fast *fast)
 
 /* ---- the report ---- */
 
+/* The nearest to `place`, mm, of those found that no touch has taken, within EITS_FAST_APART_MM;
+ * `count` where there is none. */
+static uint32_t nearest(const eits_real *place, const eits_real (*found)[2], const uint8_t *taken,
+                        uint32_t count)
+{
+    uint32_t best = count;
+    eits_real least = fast_square(EITS_FAST_APART_MM);
+    for (uint32_t n = 0; n < count; ++n) {
+        const eits_real square = fast_distance2(found[n], place);
+        if (!taken[n] && square < least) {
+            least = square;
+            best = n;
+        }
+    }
+    return best;
+}
+
 /* A touch that the solver has not found in this frame: what drives know of it. */
 static eits_touch alone(const eits_fast *fast, const eits_fast_touch *t)
 {
@@ -204,10 +221,13 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
     for (uint32_t k = 0; k < fast->n_followed; ++k) {
         const eits_fast_touch *t = &fast->followed[k];
         const eits_real place[2] = {t->x_mm, t->y_mm};
-        const uint32_t n = eits_fast_nearest(place, (const eits_real(*)[2])at, taken, count);
-        touches[k] = n < count ? found[n] : alone(fast, t);
+        const uint32_t n = nearest(place, (const eits_real(*)[2])at, taken, count);
+        /* further away, one of the two is wrong: drives know what changes within a frame */
+        const int agrees =
+            n < count && fast_distance2(at[n], place) < fast_square(EITS_FAST_AGREE_MM);
+        touches[k] = agrees ? found[n] : alone(fast, t);
         touches[k].id = t->id;
-        touches[k].confirmed = n < count || t->confirmed;
+        touches[k].confirmed = agrees || t->confirmed;
         if (n < count)
             taken[n] = 1;
     }

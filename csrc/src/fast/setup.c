@@ -60,12 +60,16 @@ static void *take(uint8_t **next, size_t bytes)
     (part)->place = take(&next, (size_t)(count) * sizeof(element));
 #define TAKE(place, element, count)         TAKE_INTO(fast, place, element, count)
 #define TAKE_WAITING(place, element, count) TAKE_INTO(held, place, element, count)
+#define TAKE_TOUCH(place, element, count)   TAKE_INTO(sight, place, element, count)
 
 static void lay_out(uint8_t *next, const eits_model *model, shape s, eits_fast *fast)
 {
     fast->drive = take(&next, s.drives * sizeof *fast->drive);
-    EITS_FAST_ARRAYS(TAKE, model->n_rows, s.most_rows, model->nx, model->ny)
-    for (fast_held *held = fast->held; held < fast->held + EITS_FAST_HELD; ++held) {
+    EITS_FAST_ARRAYS(TAKE, model->n_rows, s.most_rows, model->n_electrodes, model->nx, model->ny)
+    for (fast_sight *sight = fast->sight; sight < fast->sight + EITS_FAST_MAX_TOUCHES; ++sight) {
+        EITS_FAST_TOUCH_ARRAYS(TAKE_TOUCH, model->n_electrodes)
+    }
+    for (fast_held *held = fast->ring; held < fast->ring + EITS_FAST_RING; ++held) {
         EITS_FAST_WAITING_ARRAYS(TAKE_WAITING, s.most_rows)
     }
 }
@@ -75,7 +79,8 @@ size_t eits_fast_size(const eits_model *model)
     if (model == NULL)
         return 0;
     const shape s = shape_of(model);
-    return EITS_FAST_SIZE(model->n_rows, s.drives, s.most_rows, model->nx, model->ny);
+    return EITS_FAST_SIZE(model->n_rows, s.drives, s.most_rows, model->n_electrodes, model->nx,
+                          model->ny);
 }
 
 /* The drives' rows, in the order of the table, and the cells. */
@@ -151,8 +156,10 @@ eits_status eits_fast_begin(eits_fast *fast)
     fast->drift = 0;
     fast->wild = 0;
     memset(fast->suspect, 0, sizeof fast->suspect);
-    fast->count = fast->held_count = fast->quiet = fast->waited = fast->seeds = 0;
+    fast->count = fast->quiet = fast->seeds = fast->newsy = fast->drive_count = 0;
     fast->timed = fast->unexplained = fast->unexplained_frames = fast->glitched = 0;
+    eits_fast_empty_ring(fast);
+    fast->search.warm_count = fast->search.pair_known = fast->search.last_count = 0;
     /* What frames named stays until the next is aligned: one may still be solved meanwhile. */
     fast->fresh = 1;
     fast->next_aligned = fast->next_id;
@@ -160,6 +167,9 @@ eits_status eits_fast_begin(eits_fast *fast)
         /* Nothing is wrong with drives that were not measured yet; the first frame is not held back
          * for them. */
         fast->drive[n].explained = 1;
+        fast->drive[n].rest_at = 0;
+        fast->drive[n].learned = 1;
+        eits_fast_forget_errors(fast, n);
         for (uint32_t k = 0; k < EITS_FAST_MAX_TOUCHES; ++k)
             fast->drive[n].there[k] = 0;
     }

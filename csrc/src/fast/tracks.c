@@ -7,47 +7,46 @@
  * noise's own. */
 #include "fast/fast.h"
 
-void eits_fast_predict(eits_fast *fast, eits_real dt_s)
+/* F P F' without a matrix product: F adds dt times the speed to a place, so that rows change first,
+ * then columns. */
+static void carry(eits_fast *fast, uint32_t at, eits_real dt_s)
 {
     const uint32_t n = FAST_SIZE * fast->count;
-    /* F P F' without a matrix product: F adds dt times the speed to a place, so that rows change
-     * first, then columns. The noise that comes with time is in proportion to it, whatever the
-     * scan's rate. */
-    const eits_real drives = dt_s / EITS_FAST_DRIVE_S;
-    for (uint32_t k = 0; k < n; k += FAST_SIZE) {
-        for (uint32_t axis = 0; axis < 2; ++axis) {
-            eits_real *place = fast->p[k + axis];
-            fast->state[k + axis] += dt_s * fast->state[k + FAST_VX + axis];
-            fast_axpy(place, dt_s, fast->p[k + FAST_VX + axis], n);
-        }
+    for (uint32_t axis = 0; axis < 2; ++axis) {
+        fast->state[at + axis] += dt_s * fast->state[at + FAST_VX + axis];
+        fast_axpy(fast->p[at + axis], dt_s, fast->p[at + FAST_VX + axis], n);
     }
     for (uint32_t i = 0; i < n; ++i) {
-        for (uint32_t k = 0; k < n; k += FAST_SIZE) {
-            for (uint32_t axis = 0; axis < 2; ++axis)
-                fast->p[i][k + axis] += dt_s * fast->p[i][k + FAST_VX + axis];
-        }
-    }
-    for (uint32_t k = 0; k < fast->count; ++k) {
-        const uint32_t at = FAST_SIZE * k;
-        const eits_real speed = fast_square(EITS_FAST_SPEED_NOISE) * drives;
-        const eits_real strength = EITS_FAST_STRENGTH_NOISE * fast->known[k].peak;
-        fast->p[at + FAST_C][at + FAST_C] += fast_square(strength) * drives;
-        fast->p[at + FAST_VX][at + FAST_VX] += speed;
-        fast->p[at + FAST_VY][at + FAST_VY] += speed;
+        for (uint32_t axis = 0; axis < 2; ++axis)
+            fast->p[i][at + axis] += dt_s * fast->p[i][at + FAST_VX + axis];
     }
 }
 
-void eits_fast_loosen(eits_fast *fast, eits_real strength, eits_real place_mm)
+void eits_fast_predict(eits_fast *fast, eits_real dt_s)
+{
+    /* The noise that comes with time is in proportion to it, whatever the scan's rate. */
+    const eits_real drives = dt_s / EITS_FAST_DRIVE_S;
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        /* A speed is trusted for a few drives that nothing explains; then the touch stays where it
+         * is until something does: it may be the speed that is wrong. */
+        const int coasts = (fast->unexplained & EITS_FAST_COASTS) != EITS_FAST_COASTS;
+        const uint32_t at = FAST_SIZE * k, moving = fast->known[k].moving;
+        const uint32_t first = moving ? at + FAST_VX : at + FAST_X;
+        const eits_real noise = moving ? EITS_FAST_SPEED_NOISE : EITS_FAST_STILL_MM;
+        const eits_real strength = EITS_FAST_STRENGTH_NOISE * fast->known[k].peak;
+        if (moving && coasts)
+            carry(fast, at, dt_s);
+        fast->p[first][first] += fast_square(noise) * drives;
+        fast->p[first + 1][first + 1] += fast_square(noise) * drives;
+        fast->p[at + FAST_C][at + FAST_C] += fast_square(strength) * drives;
+    }
+}
+
+void eits_fast_loosen(eits_fast *fast, eits_real strength)
 {
     for (uint32_t k = 0; k < fast->count; ++k) {
-        const uint32_t at = FAST_SIZE * k;
-        /* While drives wait, a touch that is on may lift but not move: it would go to meet the one
-         * that lands. */
-        const int stays = fast->known[k].on && fast->held_count > 0;
-        const eits_real place = stays ? 0 : fast_square(place_mm);
-        fast->p[at][at] += place;
-        fast->p[at + 1][at + 1] += place;
-        fast->p[at + FAST_C][at + FAST_C] += fast_square(strength * fast->known[k].peak);
+        const uint32_t c = FAST_SIZE * k + FAST_C;
+        fast->p[c][c] += fast_square(strength * fast->known[k].peak);
     }
 }
 
@@ -64,20 +63,6 @@ static void row_of_h(const eits_fast *fast, uint32_t i, eits_real h[EITS_FAST_MA
     }
 }
 
-/* What is expected of row i, and what the model is wrong by in it, squared. */
-static eits_real expected(const eits_fast *fast, uint32_t i, eits_real *error)
-{
-    eits_real sum = 0;
-    *error = 0;
-    for (uint32_t k = 0; k < fast->count; ++k) {
-        const eits_real given = fast->state[FAST_SIZE * k + FAST_C] *
-                                fast->answer[FAST_WAYS * (size_t)fast->most_rows * k + i];
-        sum += given;
-        *error += fast_square(EITS_FAST_MODEL_ERROR * given);
-    }
-    return sum;
-}
-
 /* Row i of S's factor, once those before it are known: S_ij less what they have in common. */
 static void factor_row(eits_fast *fast, uint32_t i, eits_real diagonal)
 {
@@ -91,7 +76,7 @@ eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
 {
     const uint32_t n = FAST_SIZE * fast->count;
     for (uint32_t i = 0; i < rows; ++i) {
-        eits_real h[EITS_FAST_MAX_TOUCHES][3], error = 0;
+        eits_real h[EITS_FAST_MAX_TOUCHES][3];
         eits_real *moved = fast->moved + (size_t)FAST_NUMBERS * i,
                   *line = fast_line(fast->factor, i);
         eits_zero(moved, n);
@@ -99,7 +84,7 @@ eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
         fast->e[i] = 0;
         eits_real diagonal = fast_square(fast->sigma);
         if (fast->used[i]) {
-            fast->e[i] = fast->z[i] - expected(fast, i, &error);
+            fast->e[i] = fast->z[i] - fast->h[i] - fast->learned[i];
             row_of_h(fast, i, h);
             for (uint32_t k = 0; k < fast->count; ++k) {
                 for (uint32_t way = 0; way < FAST_WAYS; ++way)
@@ -115,7 +100,7 @@ eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
                 if (j < i)
                     line[j] = sum;
                 else
-                    diagonal += sum + error;
+                    diagonal += sum + fast->error[i];
             }
         }
         if (n > 0)
@@ -149,20 +134,40 @@ void eits_fast_update(eits_fast *fast, uint32_t rows)
     }
 }
 
-void eits_fast_add(eits_fast *fast, const eits_real *state, const eits_real *variance, eits_real xy)
+void eits_fast_set_covariance(eits_fast *fast, uint32_t k, eits_real (*covariance)[FAST_SIZE])
 {
-    const uint32_t at = FAST_SIZE * fast->count;
-    eits_copy(fast->state + at, state, FAST_SIZE);
+    const uint32_t at = FAST_SIZE * k, n = FAST_SIZE * fast->count;
     for (uint32_t i = 0; i < FAST_SIZE; ++i) {
-        eits_zero(fast->p[at + i], at + FAST_SIZE);
-        for (uint32_t j = 0; j < at; ++j)
+        eits_zero(fast->p[at + i], n);
+        for (uint32_t j = 0; j < n; ++j)
             fast->p[j][at + i] = 0;
-        fast->p[at + i][at + i] = variance[i];
     }
-    fast->p[at][at + 1] = fast->p[at + 1][at] = xy;
-    fast->known[fast->count++] =
-        (fast_known){.id = fast->next_id, .on = 1, .peak = eits_fabs(state[FAST_C])};
+    for (uint32_t i = 0; i < FAST_SIZE; ++i)
+        eits_copy(fast->p[at + i] + at, covariance[i], FAST_SIZE);
+}
+
+void eits_fast_add(eits_fast *fast, const eits_real *state, eits_real (*covariance)[FAST_SIZE],
+                   eits_real energy, eits_real rho2)
+{
+    const uint32_t k = fast->count++;
+    eits_copy(fast->state + (size_t)FAST_SIZE * k, state, FAST_SIZE);
+    eits_fast_set_covariance(fast, k, covariance);
+    fast->known[k] = (fast_known){
+        .id = fast->next_id, .on = 1, .peak = state[FAST_C], .energy = energy, .rho2 = rho2};
+    fast->known[k].moving = covariance[FAST_VX][FAST_VX] > 0;
     fast->next_id = fast->next_id == UINT32_MAX ? 1 : fast->next_id + 1;
+}
+
+void eits_fast_still(eits_fast *fast, uint32_t k)
+{
+    const uint32_t at = FAST_SIZE * k, n = FAST_SIZE * fast->count;
+    fast->known[k].moving = fast->known[k].slow = 0;
+    for (uint32_t speed = at + FAST_VX; speed <= at + FAST_VY; ++speed) {
+        fast->state[speed] = 0;
+        eits_zero(fast->p[speed], n);
+        for (uint32_t i = 0; i < n; ++i)
+            fast->p[i][speed] = 0;
+    }
 }
 
 void eits_fast_forget(eits_fast *fast, uint32_t k)

@@ -28,7 +28,8 @@ MODULES = (
 APART = {
     "link": ("base", "link"),
     "gesture": ("base", "gesture"),
-    "fast": ("base", "context", "fast"),
+    "fast": ("base", "context", "fast", "search"),
+    "search": ("base", "fast", "search"),
 }
 # which modules write the fields of each part of a context; api lays out, and starts and ends stages
 OWNERS = {

@@ -1,0 +1,319 @@
+/* Pieces of a search: one new touch or two, still or in motion, alone, in place of a young one, or
+ * while known ones move. */
+#include "search/search.h"
+
+static int one_is_not_enough(const eits_fast *fast)
+{
+    return search_one(fast)->exists && !eits_is_noise(fast, search_one(fast), 1) &&
+           fast->search.count > 2 && !eits_search_changed(fast, FAST_MOVE) &&
+           !eits_search_changed(fast, FAST_REPLACE);
+}
+
+/* What is looked for beside one new touch takes turns: two of them, or anything else. */
+static int odd(const eits_fast *fast)
+{
+    return (fast->search.decisions & 1u) != 0;
+}
+
+/* ---- one new touch ---- */
+
+static uint32_t cost_of_one(const eits_fast *fast)
+{
+    return 3 * fast->search.count;
+}
+
+static uint32_t cost_of_rival(const eits_fast *fast)
+{
+    return search_one(fast)->exists && !eits_search_clear(fast) ? 2 * fast->search.count : 0;
+}
+
+/* The last searches may have come to a better place near there. */
+static void warmer(const eits_fast *fast, eits_real *place)
+{
+    const fast_search *s = &fast->search;
+    for (uint32_t n = 0; n < s->warm_count && s->decisions - s->warm_at <= 2; ++n) {
+        if (!fast_apart(s->warm[n], place)) {
+            eits_copy(place, s->warm[n], 2);
+            return;
+        }
+    }
+}
+
+static int start(eits_fast *fast, const eits_real *place, uint32_t count, uint32_t steps,
+                 fast_trial *trial)
+{
+    eits_trial_begin(fast, trial, count);
+    eits_trial_add_new(trial, place, 0);
+    if (!eits_trial_say(fast, trial))
+        return 0;
+    eits_trial_refine(fast, trial, steps);
+    return 1;
+}
+
+static void swap(eits_fast *fast, fast_which a, fast_which b)
+{
+    fast_trial *next = &fast->search.next;
+    *next = *search_trial(fast, a);
+    *search_trial(fast, a) = *search_trial(fast, b);
+    *search_trial(fast, b) = *next;
+}
+
+static void run_one(eits_fast *fast)
+{
+    fast_search *s = &fast->search;
+    eits_real from[2];
+    if (!eits_fast_peak(fast, fast->score, NULL, 0, s->peak))
+        return;
+    eits_copy(from, s->peak, 2);
+    warmer(fast, from);
+    fast_trial *one = search_trial(fast, FAST_ONE);
+    if (start(fast, from, s->count, 2, one))
+        one->lead = one->all - one->left;
+}
+
+/* The next peak of the map is its rival, and takes its place if it explains more. */
+static void run_rival(eits_fast *fast)
+{
+    fast_search *s = &fast->search;
+    fast_trial *one = search_trial(fast, FAST_ONE), *rival = search_trial(fast, FAST_RIVAL);
+    eits_real from[2];
+    if (eits_fast_peak(fast, fast->score, (const eits_real(*)[2])s->peak, 1, from)) {
+        warmer(fast, from);
+        (void)start(fast, from, s->count, 1, rival);
+    }
+    if (rival->exists && rival->left < one->left)
+        swap(fast, FAST_ONE, FAST_RIVAL);
+    s->warm_count = 0;
+    for (uint32_t n = 0; n < 2; ++n) {
+        if (s->trial[FAST_ONE + n].exists)
+            eits_copy(s->warm[s->warm_count++], s->trial[FAST_ONE + n].body[0].p, 2);
+    }
+    s->warm_at = s->decisions;
+    one->lead = one->all - one->left;
+    if (rival->exists && fast_apart(rival->body[0].p, one->body[0].p) &&
+        rival->left - one->left < one->lead)
+        one->lead = rival->left - one->left;
+}
+
+/* More steps where it leaves more than noise and they may help. */
+static uint32_t cost_of_more(const eits_fast *fast)
+{
+    return one_is_not_enough(fast) ? 2 * fast->search.count : 0;
+}
+
+static void run_more(eits_fast *fast)
+{
+    fast_trial *one = search_trial(fast, FAST_ONE);
+    const eits_real before = one->left;
+    eits_trial_refine(fast, one, 2);
+    one->lead += before - one->left;
+    eits_copy(fast->search.warm[0], one->body[0].p, 2);
+}
+
+/* ---- one new touch, otherwise ---- */
+
+static uint32_t cost_of_late(const eits_fast *fast)
+{
+    uint32_t k;
+    return one_is_not_enough(fast) && odd(fast) && !eits_search_near(fast, &k)
+               ? 4 * (fast->search.count - 1)
+               : 0;
+}
+
+/* The first drive may have been measured while the touch landed. */
+static void run_late(eits_fast *fast)
+{
+    fast_trial *trial = search_trial(fast, FAST_LATE);
+    if (start(fast, search_one(fast)->body[0].p, fast->search.count - 1, 3, trial))
+        trial->lead = trial->all - trial->left;
+    if (search_one(fast)->lead < trial->lead)
+        trial->lead = search_one(fast)->lead;
+}
+
+static uint32_t cost_of_swift(const eits_fast *fast)
+{
+    return one_is_not_enough(fast) && odd(fast) ? 5 * search_last(fast, EITS_FAST_SHORT_DRIVES) : 0;
+}
+
+static void run_swift(eits_fast *fast)
+{
+    fast_trial *trial = search_trial(fast, FAST_SWIFT);
+    eits_real covariance[FAST_FIT][FAST_FIT];
+    eits_trial_begin(fast, trial, EITS_FAST_SHORT_DRIVES);
+    eits_trial_add_new(trial, search_one(fast)->body[0].p, 1);
+    (void)eits_trial_say(fast, trial);
+    eits_trial_refine(fast, trial, 4);
+    if (!trial->exists || !eits_trial_covariance(trial, covariance)) {
+        trial->exists = 0;
+        return;
+    }
+    const eits_real *p = trial->body[0].p;
+    const eits_real speed2 = fast_square(p[2]) + fast_square(p[3]);
+    const eits_real doubt = 9 * (covariance[2][2] + covariance[3][3]);
+    trial->exists = speed2 > eits_larger(doubt, fast_square(EITS_FAST_SWIFT_SPEED)) &&
+                    speed2 < fast_square(EITS_FAST_SPEED_MOST);
+    trial->lead = trial->all - trial->left;
+    if (search_one(fast)->lead < trial->lead)
+        trial->lead = search_one(fast)->lead;
+}
+
+/* ---- two new touches ---- */
+
+static uint32_t cost_of_beside(const eits_fast *fast)
+{
+    return one_is_not_enough(fast) && !odd(fast) ? EITS_FAST_MAP_ANSWERS : 0;
+}
+
+/* The map beside the best one, of the last drive. */
+static void run_beside(eits_fast *fast)
+{
+    const uint32_t count = fast->search.count;
+    const eits_real *place = search_one(fast)->body[0].p;
+    fast_sight sight = {.field = fast->search.fields};
+    fast_disc *disc = &fast->search.disc[0];
+    eits_zero(fast->search.pair_score, fast->cells);
+    if (!eits_fast_gather(fast, place, fast->rho2, disc))
+        return;
+    eits_fast_look(fast, place, fast->rho2, disc, &sight);
+    for (uint32_t n = count - 1; n < count; ++n) {
+        const fast_held *held = &fast->ring[fast->search.from + n];
+        eits_trial_answer(fast, held, disc, &sight, FAST_NONE, fast->search.ways);
+        eits_fast_map(fast, held, fast->search.ways, fast->search.pair_score);
+    }
+    fast->search.spent += EITS_FAST_MAP_ANSWERS;
+}
+
+static uint32_t cost_of_pair(const eits_fast *fast)
+{
+    return one_is_not_enough(fast) && !odd(fast) ? 6 * search_last(fast, EITS_FAST_SHORT_DRIVES)
+                                                 : 0;
+}
+
+/* Two places as they are; kept as the pair, or as its rival, if they explain more. */
+static void try_pair(eits_fast *fast, const eits_real *a, const eits_real *b)
+{
+    fast_trial *trial = &fast->search.scratch;
+    fast_trial *best = search_trial(fast, FAST_PAIR), *rival = search_trial(fast, FAST_PAIR_RIVAL);
+    eits_trial_begin(fast, trial, EITS_FAST_SHORT_DRIVES);
+    eits_trial_add_new(trial, a, 0);
+    eits_trial_add_new(trial, b, 0);
+    if (!eits_trial_say(fast, trial))
+        return;
+    if (!best->exists || trial->left < best->left) {
+        *rival = *best;
+        *best = *trial;
+    } else if (!rival->exists || trial->left < rival->left) {
+        *rival = *trial;
+    }
+}
+
+static void run_pair_starts(eits_fast *fast)
+{
+    fast_search *s = &fast->search;
+    const eits_real *first = search_one(fast)->body[0].p;
+    eits_real second[2];
+    if (eits_fast_peak(fast, s->pair_score, (const eits_real(*)[2])first, 1, second))
+        try_pair(fast, first, second);
+    if (s->pair_known && s->decisions - s->pair_at <= 3) {
+        try_pair(fast, s->pair[0], s->pair[1]);
+        return;
+    }
+    for (uint32_t axis = 0; axis < 2; ++axis) {
+        const eits_real by[2] = {axis == 0 ? EITS_FAST_HALF_PAIR_MM : 0,
+                                 axis == 1 ? EITS_FAST_HALF_PAIR_MM : 0};
+        const eits_real a[2] = {first[0] + by[0], first[1] + by[1]};
+        const eits_real b[2] = {first[0] - by[0], first[1] - by[1]};
+        try_pair(fast, a, b);
+    }
+}
+
+/* The same pair, in either order. */
+static int same_pair(const fast_trial *a, const fast_trial *b)
+{
+    const eits_real near = fast_square(EITS_FAST_SAME_PAIR_MM);
+    for (uint32_t turn = 0; turn < 2; ++turn) {
+        if (fast_distance2(a->body[0].p, b->body[turn].p) < near &&
+            fast_distance2(a->body[1].p, b->body[1 - turn].p) < near)
+            return 1;
+    }
+    return 0;
+}
+
+static void run_pair(eits_fast *fast)
+{
+    fast_search *s = &fast->search;
+    fast_trial *best = search_trial(fast, FAST_PAIR), *rival = search_trial(fast, FAST_PAIR_RIVAL);
+    if (!best->exists)
+        return;
+    eits_trial_refine(fast, best, 3);
+    for (uint32_t n = 0; n < 2; ++n)
+        eits_copy(s->pair[n], best->body[n].p, 2);
+    s->pair_known = 1;
+    s->pair_at = s->decisions;
+    best->lead = best->all - best->left;
+    if (rival->exists && !same_pair(best, rival) && rival->left - best->left < best->lead)
+        best->lead = rival->left - best->left;
+}
+
+/* A young touch that was two: it goes, and two come. */
+static uint32_t cost_of_split(const eits_fast *fast)
+{
+    uint32_t k;
+    return one_is_not_enough(fast) && odd(fast) && eits_search_near(fast, &k) &&
+                   fast->known[k].age < EITS_FAST_YOUNG
+               ? 6 * search_last(fast, EITS_FAST_SHORT_DRIVES)
+               : 0;
+}
+
+static void run_split(eits_fast *fast)
+{
+    fast_trial *trial = search_trial(fast, FAST_SPLIT);
+    const eits_real *other = search_one(fast)->body[0].p;
+    uint32_t k;
+    if (!eits_search_near(fast, &k))
+        return;
+    const eits_real *known = fast->state + FAST_SIZE * k;
+    const eits_real away[2] = {known[0] - (other[0] - known[0]) / 2,
+                               known[1] - (other[1] - known[1]) / 2};
+    eits_trial_begin(fast, trial, EITS_FAST_SHORT_DRIVES);
+    eits_trial_add_new(trial, away, 0);
+    eits_trial_add_new(trial, other, 0);
+    trial->gone = (uint8_t)k;
+    (void)eits_trial_say(fast, trial);
+    eits_trial_refine(fast, trial, 2);
+    trial->lead = trial->all;
+}
+
+/* ---- a new touch while others move, and moves by the last drives alone ---- */
+
+static uint32_t cost_of_both(const eits_fast *fast)
+{
+    const fast_trial *move = &fast->search.trial[FAST_MOVE];
+    return one_is_not_enough(fast) && odd(fast) && move->exists && move->bodies == 1
+               ? 3 * 2 * search_last(fast, EITS_FAST_LAST_DRIVES)
+               : 0;
+}
+
+static void run_both(eits_fast *fast)
+{
+    const fast_trial *move = search_trial(fast, FAST_MOVE);
+    fast_trial *trial = search_trial(fast, FAST_BOTH);
+    eits_trial_begin(fast, trial, EITS_FAST_LAST_DRIVES);
+    for (uint32_t i = 0; i < move->bodies; ++i) {
+        eits_trial_add_known(fast, trial, move->body[i].known);
+        eits_copy(trial->body[i].p, move->body[i].p, 4);
+    }
+    eits_trial_add_new(trial, search_one(fast)->body[0].p, 0);
+    (void)eits_trial_say(fast, trial);
+    eits_trial_refine(fast, trial, 2);
+    trial->lead = trial->all;
+}
+
+const search_piece eits_piece_one = {cost_of_one, run_one};
+const search_piece eits_piece_rival = {cost_of_rival, run_rival};
+const search_piece eits_piece_more = {cost_of_more, run_more};
+const search_piece eits_pieces_birth[7] = {
+    {cost_of_late, run_late},        {cost_of_swift, run_swift}, {cost_of_beside, run_beside},
+    {cost_of_pair, run_pair_starts}, {cost_of_pair, run_pair},   {cost_of_split, run_split},
+    {cost_of_both, run_both},
+};

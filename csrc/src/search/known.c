@@ -1,0 +1,224 @@
+/* Pieces of a search: known touches have moved, or one is elsewhere, faster or wider than was
+ * thought. */
+#include "search/search.h"
+
+static int any_on(const eits_fast *fast)
+{
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        if (fast->known[k].on)
+            return 1;
+    }
+    return 0;
+}
+
+/* The known touch that the best new one may be instead: the nearest. One that has just lifted may
+ * be on again, somewhat elsewhere. */
+int eits_search_near(const eits_fast *fast, uint32_t *k)
+{
+    const eits_real *place = search_one(fast)->body[0].p;
+    eits_real least = fast_square(EITS_FAST_NEAR_MM);
+    *k = EITS_FAST_MAX_TOUCHES;
+    for (uint32_t n = 0; n < fast->count; ++n) {
+        const eits_real far = fast_distance2(fast->state + FAST_SIZE * n, place);
+        if (far < least) {
+            least = far;
+            *k = n;
+        }
+    }
+    return *k < EITS_FAST_MAX_TOUCHES;
+}
+
+int eits_search_changed(const eits_fast *fast, fast_which which)
+{
+    const fast_trial *trial = &fast->search.trial[which];
+    return trial->exists && eits_is_clear(fast, trial, trial->fresh) &&
+           eits_cost_of_birth(search_one(fast)) - trial->left > 2 * EITS_FAST_MOVE_MARGIN;
+}
+
+int eits_search_clear(const eits_fast *fast)
+{
+    const fast_trial *move = &fast->search.trial[FAST_MOVE];
+    return eits_search_changed(fast, FAST_MOVE) &&
+           move->all - move->left > EITS_FAST_MOVE_CLEAR / 2;
+}
+
+/* ---- known touches move ---- */
+
+/* A known touch by itself as it was: what moving it promises. */
+static eits_real promise_of(eits_fast *fast, uint32_t k, uint32_t count)
+{
+    fast_trial *trial = &fast->search.scratch;
+    eits_trial_begin(fast, trial, count);
+    eits_trial_add_known(fast, trial, k);
+    trial->as_known = 1;
+    return eits_trial_say(fast, trial) ? eits_trial_promise(trial) : 0;
+}
+
+/* The touches that have moved as far as their slopes tell: the one that promises most, and the next
+ * if the two together promise clearly more. */
+static void choose_moves(eits_fast *fast, uint32_t count, fast_trial *trial)
+{
+    uint32_t first = EITS_FAST_MAX_TOUCHES, second = EITS_FAST_MAX_TOUCHES;
+    eits_real most = 0, next = 0;
+    trial->exists = 0;
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        const eits_real promise = fast->known[k].on ? promise_of(fast, k, count) : 0;
+        if (promise > most) {
+            second = first;
+            next = most;
+            first = k;
+            most = promise;
+        } else if (promise > next) {
+            second = k;
+            next = promise;
+        }
+    }
+    if (first == EITS_FAST_MAX_TOUCHES)
+        return;
+    eits_trial_begin(fast, trial, count);
+    eits_trial_add_known(fast, trial, first);
+    trial->as_known = 1;
+    if (second == EITS_FAST_MAX_TOUCHES || !(next > EITS_FAST_MOVES_EACH)) {
+        (void)eits_trial_say(fast, trial);
+        return;
+    }
+    fast_trial *both = &fast->search.scratch;
+    (void)eits_trial_say(fast, trial);
+    *both = *trial;
+    eits_trial_add_known(fast, both, second);
+    if (eits_trial_say(fast, both) && eits_trial_promise(both) > most + EITS_FAST_MOVES_EACH)
+        *trial = *both;
+}
+
+static uint32_t cost_of_move(const eits_fast *fast)
+{
+    return any_on(fast) ? (3 + fast->count / 4) * fast->search.count : 0;
+}
+
+static void run_move(eits_fast *fast)
+{
+    fast_trial *trial = search_trial(fast, FAST_MOVE);
+    choose_moves(fast, fast->search.count, trial);
+    eits_trial_refine(fast, trial, 2);
+}
+
+/* ---- a known one is elsewhere, faster or wider ---- */
+
+static uint32_t cost_of_replace(const eits_fast *fast)
+{
+    uint32_t k;
+    return search_one(fast)->exists && !eits_search_clear(fast) && eits_search_near(fast, &k)
+               ? 2 * fast->search.count
+               : 0;
+}
+
+/* A new touch in place of a known one; `trial` is refined from `place`. */
+static int instead(eits_fast *fast, uint32_t k, const eits_real *place, eits_real rho2, int moves,
+                   fast_trial *trial)
+{
+    eits_trial_begin(fast, trial, fast->search.count);
+    eits_trial_add_new(trial, place, moves);
+    trial->gone = (uint8_t)k;
+    trial->rho2 = rho2;
+    trial->as_known = !moves && rho2 == fast->known[k].rho2;
+    if (!eits_trial_say(fast, trial))
+        return 0;
+    eits_trial_refine(fast, trial, 2);
+    const eits_real far = fast_distance2(trial->body[0].p, fast->state + FAST_SIZE * k);
+    const eits_real most = (moves ? 2 : 1) * EITS_FAST_APART_MM;
+    return far < fast_square(most);
+}
+
+/* Strengths that jump from what they were cost; so do another width and a speed. */
+static eits_real cost_of_instead(const eits_fast *fast, const fast_trial *trial)
+{
+    const fast_known *known = &fast->known[trial->gone];
+    const eits_real wider = trial->rho2 != known->rho2 ? R(4) : R(0);
+    eits_real cost = trial->left + wider + (trial->body[0].numbers == 4 ? R(6) : R(0));
+    for (uint32_t n = 0; n < trial->count; ++n) {
+        const eits_real before = search_drive(fast, trial, n)->state[trial->gone][FAST_C];
+        const eits_real change =
+            (trial->strength[n][0] - before) / (EITS_FAST_CHANGES * known->peak);
+        const eits_real each = fast_square(change);
+        cost += each < EITS_FAST_CHANGE_MOST ? each : EITS_FAST_CHANGE_MOST;
+    }
+    return cost;
+}
+
+static void keep_better(eits_fast *fast, fast_trial *trial)
+{
+    fast_trial *best = search_trial(fast, FAST_REPLACE);
+    trial->cost = cost_of_instead(fast, trial);
+    if (!best->exists || trial->cost < best->cost)
+        *best = *trial;
+}
+
+static void run_replace(eits_fast *fast)
+{
+    fast_trial *trial = &fast->search.scratch;
+    uint32_t k;
+    if (eits_search_near(fast, &k) &&
+        instead(fast, k, fast->state + FAST_SIZE * k, fast->known[k].rho2, 0, trial))
+        keep_better(fast, trial);
+}
+
+static uint32_t cost_of_swerve(const eits_fast *fast)
+{
+    const int wanted = fast->search.trial[FAST_REPLACE].exists && fast->search.count > 2 &&
+                       !eits_search_clear(fast);
+    return wanted ? 3 * fast->search.count : 0;
+}
+
+static void run_swerve(eits_fast *fast)
+{
+    fast_trial *trial = &fast->search.scratch;
+    const fast_trial *still = search_trial(fast, FAST_REPLACE);
+    const uint32_t k = still->gone;
+    eits_real covariance[FAST_FIT][FAST_FIT];
+    if (!instead(fast, k, still->body[0].p, fast->known[k].rho2, 1, trial) ||
+        !eits_trial_covariance(trial, covariance))
+        return;
+    const eits_real *p = trial->body[0].p;
+    const eits_real speed2 = fast_square(p[2]) + fast_square(p[3]);
+    const eits_real doubt = 9 * (covariance[2][2] + covariance[3][3]);
+    if (trial->left + 6 < still->left &&
+        speed2 > eits_larger(doubt, fast_square(EITS_FAST_SWERVE_SPEED)) &&
+        speed2 < fast_square(EITS_FAST_SPEED_MOST))
+        keep_better(fast, trial);
+}
+
+static uint32_t cost_of_wider(const eits_fast *fast)
+{
+    uint32_t k;
+    return fast->search.count > 4 && search_one(fast)->exists && !eits_search_clear(fast) &&
+                   eits_search_near(fast, &k) && fast->known[k].age < EITS_FAST_WIDENS
+               ? 6 * fast->search.count
+               : 0;
+}
+
+static void try_wider(eits_fast *fast, eits_real rho)
+{
+    fast_trial *trial = &fast->search.scratch;
+    uint32_t k;
+    if (eits_search_near(fast, &k) && fast_square(rho) != fast->known[k].rho2 &&
+        instead(fast, k, fast->state + FAST_SIZE * k, fast_square(rho), 0, trial))
+        keep_better(fast, trial);
+}
+
+static void run_wide(eits_fast *fast)
+{
+    try_wider(fast, EITS_FAST_RHO_WIDE_MM);
+}
+
+static void run_wider(eits_fast *fast)
+{
+    try_wider(fast, EITS_FAST_RHO_WIDER_MM);
+}
+
+const search_piece eits_piece_move = {cost_of_move, run_move};
+const search_piece eits_pieces_change[4] = {
+    {cost_of_replace, run_replace},
+    {cost_of_swerve, run_swerve},
+    {cost_of_wider, run_wide},
+    {cost_of_wider, run_wider},
+};
