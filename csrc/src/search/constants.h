@@ -198,45 +198,6 @@
  * a pair is its own rival */
 #define EITS_FAST_SAME_PAIR_MM R(10.0)
 
-/* ---- Chosen: on tuning streams, whose seed and runs were not kept, for a whole-frame tracker that
- * smoothed places as well. Check: eitskin study hands */
-
-/* a touch of frames alone that explains less waits for a second one: it may be half of another [of
- * |y|^2]. larger: light touches start late; smaller: halves are reported */
-#define EITS_FAST_SURE_FRACTION R(0.05)
-
-/* and one whose own S'y is less [lambda_noise]. larger: faint touches start late; smaller: noise is
- * reported at once */
-#define EITS_FAST_SURE_CLEARNESS R(1.5)
-
-/* that may lack a touch before its id ends [frames]. larger: another finger gets its id; smaller: a
- * faint touch loses its id */
-#define EITS_FAST_SEEN_HOLD 2
-
-/* a faint touch found so often is reported while it is missed [frames]. larger: faint touches
- * flicker; smaller: noise is held */
-#define EITS_FAST_SEEN_KNOWN 4
-
-/* how far a touch that is not reported yet may move: noise is found anywhere, a touch beside itself
- * [of follow_mm]. larger: noise confirms noise; smaller: fast fingers start late */
-#define EITS_FAST_SEEN_REACH R(0.6)
-
-/* rms by which a velocity changes [of follow_mm a frame]. larger: places of noise turn it; smaller:
- * turns are followed late */
-#define EITS_FAST_SEEN_CHANGE R(0.028)
-
-/* rms of a new touch's velocity [of follow_mm a frame]. larger: the first two places decide it;
- * smaller: fast fingers are lost at first */
-#define EITS_FAST_SEEN_SPEED R(0.12)
-
-/* deviation of the place of a touch that is as clear as noise [pixels]. larger: velocities follow
- * late; smaller: noise makes velocities */
-#define EITS_FAST_SEEN_NOISE R(0.66)
-
-/* no place is better known than this [pixels]. larger: as FAST_SEEN_NOISE; smaller: a gain of
- * rounding */
-#define EITS_FAST_SEEN_DEVIATION R(0.01)
-
 /* clang-format on */
 
 #endif
