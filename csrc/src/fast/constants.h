@@ -22,9 +22,20 @@
  * noise starts searches */
 #define EITS_FAST_NEWS R(45.0)
 
+/* what moving a touch promises above which a change of strengths is no explanation [of chi^2].
+ * larger: a touch that starts is taken for one that lifts; smaller: lifts start searches */
+#define EITS_FAST_MOVES R(25.0)
+
+/* least determinant of a touch's two slopes of unit length. as FAST_MOVES */
+#define EITS_FAST_NO_SLOPE R(0.0001)
+
 /* square of one row's deviation that may be a glitch. larger: glitches delay; smaller: light
  * touches lose a row */
 #define EITS_FAST_GLITCH R(60.0)
+
+/* the same while drives wait for an explanation. larger: glitches delay touches; smaller: drives of
+ * touches that start to move are lost */
+#define EITS_FAST_GLITCH_WAITING R(3000.0)
 
 /* a row with less is wild [of the reference]. larger: strong touches kill rows; smaller: open
  * electrodes look like touches */

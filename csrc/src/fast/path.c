@@ -86,7 +86,9 @@ static int is_glitch(eits_fast *fast, uint32_t rows)
             worst = i;
         }
     }
-    if (!(greatest > EITS_FAST_GLITCH) || fast->glitched)
+    /* While drives wait, a touch that lands or starts to move may change one row by far the most. */
+    const eits_real least = fast->held_count > 0 ? EITS_FAST_GLITCH_WAITING : EITS_FAST_GLITCH;
+    if (!(greatest > least) || fast->glitched)
         return 0;
     /* One row, and not twice on end: a second such drive is a faulty electrode or a touch beside
      * it, and taking rows out drive by drive would hide either. */
@@ -128,24 +130,59 @@ static int is_drift(eits_fast *fast, uint32_t rows)
     return 1;
 }
 
+/* What moving one of the touches that are on promises of chi^2, the most of them. */
+static eits_real promise_of_moves(eits_fast *fast, uint32_t rows)
+{
+    eits_real most = 0, *x = fast->spare, *y = fast->other_factor;
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        const eits_real *answer = fast->answer + FAST_WAYS * (size_t)fast->most_rows * k;
+        if (!fast->known[k].on)
+            continue;
+        for (uint32_t i = 0; i < rows; ++i) {
+            x[i] = fast->used[i] ? answer[fast->most_rows + i] : 0;
+            y[i] = fast->used[i] ? answer[2 * (size_t)fast->most_rows + i] : 0;
+        }
+        fast_whiten(fast->factor, x, rows);
+        fast_whiten(fast->factor, y, rows);
+        const eits_real along_x = fast_dot(x, fast->white, rows), xx = fast_dot(x, x, rows);
+        const eits_real along_y = fast_dot(y, fast->white, rows), yy = fast_dot(y, y, rows);
+        const eits_real xy = fast_dot(x, y, rows), det = xx * yy - xy * xy;
+        if (!(det > EITS_FAST_NO_SLOPE * xx * yy))
+            continue;
+        const eits_real promise =
+            (yy * along_x * along_x - 2 * xy * along_x * along_y + xx * along_y * along_y) / det;
+        most = promise > most ? promise : most;
+    }
+    return most;
+}
+
+/* Whether the touches explain the rows as they are whitened now. Those that moving a touch explains
+ * clearly better are news. */
+static int is_explained(eits_fast *fast, uint32_t rows, eits_real chi2)
+{
+    return chi2 < EITS_FAST_NEWS && promise_of_moves(fast, rows) < EITS_FAST_MOVES;
+}
+
 /* Where known strengths may have changed at once, which is allowed in two steps; chi^2 as it is
- * then. Where that does not explain the rows either, the touches stay as sure as they were. Places
+ * then, and whether that explains the rows. Where that does not explain the rows either, the touches stay as sure as they were. Places
  * are never loosened: a known touch would go to meet one that lands. */
-static eits_real with_changes(eits_fast *fast, uint32_t rows, eits_real chi2)
+static int with_changes(eits_fast *fast, uint32_t rows, eits_real *chi2)
 {
     const eits_real strength[2] = {EITS_FAST_STRENGTH_JUMP, EITS_FAST_CHANGE};
     eits_real kept[EITS_FAST_MAX_TOUCHES];
     for (uint32_t k = 0; k < fast->count; ++k)
         kept[k] = fast->p[FAST_SIZE * k + FAST_C][FAST_SIZE * k + FAST_C];
-    for (uint32_t how = 0; how < 2 && fast->count > 0 && !(chi2 < EITS_FAST_NEWS); ++how) {
+    int explained = 0;
+    for (uint32_t how = 0; how < 2 && fast->count > 0 && !explained; ++how) {
         for (uint32_t k = 0; k < fast->count; ++k)
             fast->p[FAST_SIZE * k + FAST_C][FAST_SIZE * k + FAST_C] = kept[k];
         eits_fast_loosen(fast, strength[how]);
-        chi2 = eits_fast_innovate(fast, rows);
+        *chi2 = eits_fast_innovate(fast, rows);
+        explained = is_explained(fast, rows, *chi2);
     }
-    for (uint32_t k = 0; k < fast->count && !(chi2 < EITS_FAST_NEWS); ++k)
+    for (uint32_t k = 0; k < fast->count && !explained; ++k)
         fast->p[FAST_SIZE * k + FAST_C][FAST_SIZE * k + FAST_C] = kept[k];
-    return chi2;
+    return explained;
 }
 
 /* chi^2 of the last drives beyond what noise leaves of their rows. */
@@ -213,9 +250,9 @@ static void believe(eits_fast *fast, uint32_t drive, int jumped)
 
 /* Rows that some explanation by known touches or none fits are believed; others are news, and wait
  * for the search. Returns whether they are accounted for. */
-static int take_news(eits_fast *fast, uint32_t drive, uint32_t used, eits_real chi2, int jumped)
+static int take_news(eits_fast *fast, uint32_t drive, uint32_t used, eits_real chi2, int news,
+                     int jumped)
 {
-    const int news = !(chi2 < EITS_FAST_NEWS);
     fast->newsy = fast->newsy << 1 | (uint32_t)news;
     if (news && fast->count > 0 && eits_fast_is_known_error(fast, drive, chi2))
         return 1;
@@ -245,6 +282,7 @@ static int look(eits_fast *fast, uint32_t drive, const eits_real *volts)
     eits_fast_expect(fast, drive);
     eits_real chi2 = eits_fast_innovate(fast, rows);
     const int calm = chi2 < EITS_FAST_NEWS;
+    int news = 0;
     if (calm) {
         fast->glitched = 0;
     } else {
@@ -253,9 +291,9 @@ static int look(eits_fast *fast, uint32_t drive, const eits_real *volts)
             eits_fast_update(fast, rows);
             return 1;
         }
-        chi2 = with_changes(fast, rows, chi2);
+        news = !with_changes(fast, rows, &chi2);
     }
-    return take_news(fast, drive, used, chi2, !calm);
+    return take_news(fast, drive, used, chi2, news, !calm);
 }
 
 /* A touch that moves but has stayed in place for some drives is still. Its speed alone would not
