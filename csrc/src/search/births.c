@@ -9,10 +9,13 @@ static int one_is_not_enough(const eits_fast *fast)
            !eits_search_changed(fast, FAST_REPLACE);
 }
 
-/* What is looked for beside one new touch takes turns: two of them, or anything else. */
+/* What is looked for beside one new touch takes turns: two of them, or anything else; again what the
+ * last search would have acted on. */
 static int odd(const eits_fast *fast)
 {
-    return (fast->search.decisions & 1u) != 0;
+    const fast_search *s = &fast->search;
+    const int again = s->last_count > 0 && s->last_at == s->decisions;
+    return again ? s->last_count == 1 : (s->decisions & 1u) != 0;
 }
 
 /* ---- one new touch ---- */

@@ -127,8 +127,8 @@ static int is_stable(eits_fast *fast, const fast_trial *trial)
     /* the first touch has no rival that is known already, and is awaited the most */
     const int first_of_all = fast->count == 0 && trial->fresh == 1;
     uint32_t need = crowd ? EITS_FAST_STABLE_CROWD : EITS_FAST_STABLE;
-    if (first_of_all && eits_is_clear(fast, trial, 1))
-        need = 1;
+    if (eits_is_clear(fast, trial, trial->fresh))
+        need = first_of_all ? 1 : EITS_FAST_STABLE;
     if (s->last_times < need)
         return 0;
     s->last_count = 0;
