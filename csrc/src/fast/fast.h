@@ -37,6 +37,9 @@ typedef struct fast_sight {
     eits_real z[2], radius;
 } fast_sight;
 
+/* What the last frame said of a touch: it did not show it, near where drives had it, or elsewhere. */
+typedef enum fast_last { FAST_NOT_SEEN, FAST_AGREED, FAST_ELSEWHERE } fast_last;
+
 /* A touch beside its state. */
 typedef struct fast_known {
     uint32_t id;
@@ -45,8 +48,8 @@ typedef struct fast_known {
     uint32_t frames_missed, confirmed;
     uint32_t aligned; /* it was there when a frame was last aligned, and where */
     eits_real at[2];
-    uint32_t is_elsewhere; /* the last frame had it at `elsewhere` */
-    eits_real elsewhere[2];
+    fast_last last; /* what the last frame said of it, and where it had it */
+    eits_real place[2];
     eits_real anchor[2]; /* where it was `slow` drives ago */
     eits_real energy;    /* mean of what it explains of a drive's chi^2 */
     eits_real peak;      /* its greatest strength */

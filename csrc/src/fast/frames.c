@@ -238,15 +238,15 @@ static void seed(eits_fast *fast, const eits_touch *found, const eits_real (*at)
     }
 }
 
-/* A touch that frames have elsewhere, and drives did not follow, is put where it must be by now:
- * two frames on end also tell how it moves, from the middle of one scan to that of the next. */
-static void put(eits_fast *fast, uint32_t k, const eits_real *place, eits_real c)
+/* A touch is put where it must be by now by two frames on end, the first of which had it at
+ * `before`: they also tell how it moves, from the middle of one scan to that of the next. */
+static void put(eits_fast *fast, uint32_t k, const eits_real *before, const eits_real *place,
+                eits_real c)
 {
     fast_known *known = &fast->known[k];
-    const eits_real by[2] = {place[0] - known->elsewhere[0], place[1] - known->elsewhere[1]};
+    const eits_real by[2] = {place[0] - before[0], place[1] - before[1]};
     const eits_real far2 = by[0] * by[0] + by[1] * by[1];
-    const int moves = known->is_elsewhere && fast->frame_s > 0 &&
-                      far2 > fast_square(EITS_FAST_PUT_MOVES_MM) &&
+    const int moves = fast->frame_s > 0 && far2 > fast_square(EITS_FAST_PUT_MOVES_MM) &&
                       far2 < fast_square(EITS_FAST_APART_MM);
     eits_real now[2] = {place[0], place[1]};
     for (uint32_t axis = 0; axis < 2 && moves; ++axis)
@@ -263,24 +263,25 @@ static void put(eits_fast *fast, uint32_t k, const eits_real *place, eits_real c
 }
 
 /* A touch that two frames on end show elsewhere is put there. If drives explain a frame, a touch
- * that moves is theirs; if they do not, it may have gone on between the two frames. */
+ * that moves is theirs; if they do not, it may have gone on between the two frames, and the first of
+ * them may still have agreed. */
 static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_real c)
 {
     fast_known *known = &fast->known[k];
-    const eits_real near = fast_square(EITS_FAST_AGREE_MM);
-    known->frames_missed = 0;
-    if (fast_distance2(place, known->at) < near) {
-        known->confirmed = 1;
-        known->is_elsewhere = 0;
-        return;
-    }
+    const fast_last before = known->last;
+    const eits_real by = fast_distance2(place, known->place);
     const eits_real reach = fast->frame_explained ? EITS_FAST_AGREE_MM : EITS_FAST_APART_MM;
-    const int again =
-        known->is_elsewhere && fast_distance2(place, known->elsewhere) < fast_square(reach);
-    if (again && !(known->moving && fast->frame_explained))
-        put(fast, k, place, c);
-    known->is_elsewhere = 1;
-    eits_copy(known->elsewhere, place, 2);
+    const int lost = known->moving && !fast->frame_explained && before == FAST_AGREED;
+    const int again = (before == FAST_ELSEWHERE || lost) && by < fast_square(reach);
+    known->frames_missed = 0;
+    known->last = fast_distance2(place, known->at) < fast_square(EITS_FAST_AGREE_MM)
+                           ? FAST_AGREED
+                           : FAST_ELSEWHERE;
+    if (known->last == FAST_AGREED)
+        known->confirmed = 1;
+    else if (again && !(known->moving && fast->frame_explained))
+        put(fast, k, known->place, place, c);
+    eits_copy(known->place, place, 2);
 }
 
 eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t count)
@@ -309,7 +310,7 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
         fast_known *known = &fast->known[k];
         if (!known->aligned || (seen >> k & 1u) != 0 || !known->on)
             continue;
-        known->is_elsewhere = 0;
+        known->last = FAST_NOT_SEEN;
         if (++known->frames_missed >= EITS_FAST_LOST_FRAMES)
             eits_fast_drop(fast, k);
     }
