@@ -79,7 +79,7 @@ typedef struct eits_fast eits_fast;
 
 /* Touches of a hypothesis; numbers by which they move; and how many hypotheses are kept, each with
  * its normal equations. */
-#define EITS_FAST_BODIES       3u
+#define EITS_FAST_BODIES       2u
 #define EITS_FAST_BODY_NUMBERS (4u * EITS_FAST_BODIES)
 #define EITS_FAST_TRIALS       12u
 #define EITS_FAST_TRIAL_NUMBERS \
@@ -105,7 +105,7 @@ typedef struct eits_fast eits_fast;
 #define EITS_FAST_DRIVE (24u + EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS * sizeof(eits_real))
 
 /* Pixels along a side of the fields that are kept as numbers. */
-#define EITS_FAST_KEPT_SIDE 10u
+#define EITS_FAST_KEPT_SIDE 7u
 
 /* Every second pixel along x and y is a cell of the map; and the numbers of a packed triangle. */
 #define EITS_FAST_CELLS(nx, ny)        (((size_t)(nx) + 1u) / 2u * (((size_t)(ny) + 1u) / 2u))

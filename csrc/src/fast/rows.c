@@ -8,8 +8,22 @@
  * and a drive one: this sum costs 900. */
 #include "fast/fields.h"
 
-/* E_drive . E of each electrode's current at the pixels, times each way's weight, summed. Two
- * electrodes at a time, so that their sums stay in registers. */
+/* E_drive . E of two electrodes' currents at one pixel, times each way's weight, onto `sum`. */
+static inline void add_pixel(const eits_real along[2], const eits_real *x, const eits_real *y,
+                             const eits_real weight[FAST_WAYS], eits_real sum[2][FAST_WAYS])
+{
+    const eits_real first = eits_fma(along[0], x[0], along[1] * y[0]);
+    const eits_real second = eits_fma(along[0], x[1], along[1] * y[1]);
+    sum[0][0] = eits_fma(weight[0], first, sum[0][0]);
+    sum[0][1] = eits_fma(weight[1], first, sum[0][1]);
+    sum[0][2] = eits_fma(weight[2], first, sum[0][2]);
+    sum[1][0] = eits_fma(weight[0], second, sum[1][0]);
+    sum[1][1] = eits_fma(weight[1], second, sum[1][1]);
+    sum[1][2] = eits_fma(weight[2], second, sum[1][2]);
+}
+
+/* The same of each electrode at all pixels: two electrodes at a time, and no loop over the ways, so
+ * that their sums stay in registers. */
 static void add_up(const eits_fast *fast, const fast_drive *d, const fast_disc *disc,
                    eits_real of[FAST_WAYS][EITS_MAX_ELECTRODES])
 {
@@ -23,20 +37,14 @@ static void add_up(const eits_fast *fast, const fast_drive *d, const fast_disc *
         along[n][1] = y[d->plus] - y[d->minus];
     }
     for (uint32_t e = 0; e < electrodes; e += 2) {
-        eits_real a[FAST_WAYS] = {0, 0, 0}, b[FAST_WAYS] = {0, 0, 0};
+        eits_real sum[2][FAST_WAYS] = {{0, 0, 0}, {0, 0, 0}};
         for (uint32_t n = 0; n < disc->count; ++n) {
-            const eits_real *x = field[n] + e, *y = x + electrodes;
-            const eits_real *weight = disc->near[n].weight;
-            const eits_real first = eits_fma(along[n][0], x[0], along[n][1] * y[0]);
-            const eits_real second = eits_fma(along[n][0], x[1], along[n][1] * y[1]);
-            for (uint32_t way = 0; way < FAST_WAYS; ++way) {
-                a[way] = eits_fma(weight[way], first, a[way]);
-                b[way] = eits_fma(weight[way], second, b[way]);
-            }
+            const eits_real *x = field[n] + e;
+            add_pixel(along[n], x, x + electrodes, disc->near[n].weight, sum);
         }
         for (uint32_t way = 0; way < FAST_WAYS; ++way) {
-            of[way][e] = a[way];
-            of[way][e + 1] = b[way];
+            of[way][e] = sum[0][way];
+            of[way][e + 1] = sum[1][way];
         }
     }
 }

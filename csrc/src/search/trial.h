@@ -9,7 +9,7 @@
 #include "eitskin/fast.h"
 #include "fast/constants.h"
 
-enum { FAST_BODIES = 3, FAST_NEW = 2, FAST_FIT = 4 * FAST_BODIES };
+enum { FAST_BODIES = EITS_FAST_BODIES, FAST_NEW = 2, FAST_FIT = 4 * FAST_BODIES };
 enum { FAST_TRIANGLE = FAST_FIT * (FAST_FIT + 1) / 2 };
 enum { FAST_NONE = 255 };
 
