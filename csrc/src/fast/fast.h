@@ -135,7 +135,7 @@ struct eits_fast {
     eits_real *bias, *bias_variance, *bias_h, *rest;
     /* drives: the last ones; those of them that wait for an explanation; quiet ones on end */
     uint32_t ring_count, held_count, quiet;
-    fast_held ring[EITS_FAST_RING];
+    fast_held held[EITS_FAST_RING], *ring[EITS_FAST_RING]; /* the drives; from the oldest on */
     eits_real
         chi2[EITS_FAST_SUM_DRIVES]; /* of the last drives above their rows, the oldest first */
     uint32_t chi2_count;

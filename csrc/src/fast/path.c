@@ -86,7 +86,8 @@ static int is_glitch(eits_fast *fast, uint32_t rows)
             worst = i;
         }
     }
-    /* While drives wait, a touch that lands or starts to move may change one row by far the most. */
+    /* While drives wait, a touch that lands or starts to move may change one row by far the most.
+     */
     const eits_real least = fast->held_count > 0 ? EITS_FAST_GLITCH_WAITING : EITS_FAST_GLITCH;
     if (!(greatest > least) || fast->glitched)
         return 0;
@@ -164,8 +165,9 @@ static int is_explained(eits_fast *fast, uint32_t rows, eits_real chi2)
 }
 
 /* Where known strengths may have changed at once, which is allowed in two steps; chi^2 as it is
- * then, and whether that explains the rows. Where that does not explain the rows either, the touches stay as sure as they were. Places
- * are never loosened: a known touch would go to meet one that lands. */
+ * then, and whether that explains the rows. Where that does not explain the rows either, the
+ * touches stay as sure as they were. Places are never loosened: a known touch would go to meet one
+ * that lands. */
 static int with_changes(eits_fast *fast, uint32_t rows, eits_real *chi2)
 {
     const eits_real strength[2] = {EITS_FAST_STRENGTH_JUMP, EITS_FAST_CHANGE};

@@ -39,8 +39,8 @@ void eits_fast_whiten_ways(const fast_held *held, uint32_t stride, uint32_t rows
 static fast_held *next_place(eits_fast *fast)
 {
     if (fast->ring_count < EITS_FAST_RING)
-        return &fast->ring[fast->ring_count++];
-    const fast_held oldest = fast->ring[0];
+        return fast->ring[fast->ring_count++];
+    fast_held *oldest = fast->ring[0];
     for (uint32_t n = 1; n < EITS_FAST_RING; ++n)
         fast->ring[n - 1] = fast->ring[n];
     fast->ring[EITS_FAST_RING - 1] = oldest;
@@ -48,7 +48,7 @@ static fast_held *next_place(eits_fast *fast)
         --fast->search.from;
     else
         fast->search.active = 0; /* its first drive is gone */
-    return &fast->ring[EITS_FAST_RING - 1];
+    return oldest;
 }
 
 /* The factor where no touch is known: the noise alone. It is the same for each such drive. */
@@ -132,9 +132,9 @@ void eits_fast_hold_all(eits_fast *fast)
     fast->held_count = fast->ring_count < EITS_FAST_HELD ? fast->ring_count : EITS_FAST_HELD;
     eits_zero(fast->score, fast->cells);
     for (uint32_t n = fast->ring_count - fast->held_count; n < fast->ring_count; ++n) {
-        fast->ring[n].mapped = 0;
-        if (!fast->ring[n].ready)
-            whiten(fast, &fast->ring[n]);
+        fast->ring[n]->mapped = 0;
+        if (!fast->ring[n]->ready)
+            whiten(fast, fast->ring[n]);
     }
 }
 

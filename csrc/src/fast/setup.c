@@ -69,7 +69,8 @@ static void lay_out(uint8_t *next, const eits_model *model, shape s, eits_fast *
     for (fast_sight *sight = fast->sight; sight < fast->sight + EITS_FAST_MAX_TOUCHES; ++sight) {
         EITS_FAST_TOUCH_ARRAYS(TAKE_TOUCH, model->n_electrodes)
     }
-    for (fast_held *held = fast->ring; held < fast->ring + EITS_FAST_RING; ++held) {
+    for (fast_held *held = fast->held; held < fast->held + EITS_FAST_RING; ++held) {
+        fast->ring[held - fast->held] = held;
         EITS_FAST_WAITING_ARRAYS(TAKE_WAITING, s.most_rows)
     }
 }

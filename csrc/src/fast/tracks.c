@@ -72,9 +72,33 @@ static void factor_row(eits_fast *fast, uint32_t i, eits_real diagonal)
     fast_line(fast->factor, i)[i] = eits_sqrt(pivot > 0 ? pivot : fast_square(fast->sigma));
 }
 
+/* Where no touch is known, the noise alone: the triangle is a diagonal. */
+static eits_real innovate_alone(eits_fast *fast, uint32_t rows)
+{
+    eits_zero(fast->factor, (size_t)rows * (rows + 1) / 2);
+    for (uint32_t i = 0; i < rows; ++i) {
+        fast->e[i] = fast->used[i] ? fast->z[i] : 0;
+        fast->white[i] = fast->e[i] / fast->sigma;
+        fast_line(fast->factor, i)[i] = fast->sigma;
+    }
+    return fast_dot(fast->white, fast->white, rows);
+}
+
+/* Onto row i's P h', for touch k. */
+static inline void add_moved(const eits_fast *fast, uint32_t k, const eits_real h[3], uint32_t n,
+                             eits_real *moved)
+{
+    const eits_real *p = fast->p[FAST_SIZE * k];
+    for (uint32_t c = 0; c < n; ++c, ++p)
+        moved[c] = eits_fma(h[2], p[2 * FAST_NUMBERS],
+                            eits_fma(h[1], p[FAST_NUMBERS], eits_fma(h[0], p[0], moved[c])));
+}
+
 eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
 {
     const uint32_t n = FAST_SIZE * fast->count;
+    if (n == 0)
+        return innovate_alone(fast, rows);
     for (uint32_t i = 0; i < rows; ++i) {
         eits_real h[EITS_FAST_MAX_TOUCHES][3];
         eits_real *moved = fast->moved + (size_t)FAST_NUMBERS * i,
@@ -86,40 +110,33 @@ eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
         if (fast->used[i]) {
             fast->e[i] = fast->z[i] - fast->h[i] - fast->learned[i];
             row_of_h(fast, i, h);
-            for (uint32_t k = 0; k < fast->count; ++k) {
-                for (uint32_t way = 0; way < FAST_WAYS; ++way)
-                    fast_axpy(moved, h[k][way], fast->p[FAST_SIZE * k + way], n);
-            }
+            for (uint32_t k = 0; k < fast->count; ++k)
+                add_moved(fast, k, h[k], n, moved);
             /* S_ij = h_i P h_j', of which P h_j' stands in `moved`: only the three numbers of a
              * touch that a row can see are multiplied, not all five. */
             for (uint32_t j = 0; j <= i; ++j) {
                 const eits_real *other = fast->moved + (size_t)FAST_NUMBERS * j;
                 eits_real sum = 0;
-                for (uint32_t k = 0; k < fast->count; ++k)
-                    sum += fast_dot(h[k], other + FAST_SIZE * k, FAST_WAYS);
+                for (uint32_t k = 0; k < fast->count; ++k, other += FAST_SIZE)
+                    sum += eits_fma(h[k][2], other[2],
+                                    eits_fma(h[k][1], other[1], h[k][0] * other[0]));
                 if (j < i)
                     line[j] = sum;
                 else
                     diagonal += sum + fast->error[i];
             }
         }
-        if (n > 0)
-            factor_row(fast, i, diagonal);
-        else /* the noise alone: the triangle is a diagonal */
-            line[i] = eits_sqrt(diagonal);
+        factor_row(fast, i, diagonal);
     }
     eits_copy(fast->white, fast->e, rows);
-    for (uint32_t i = 0; i < rows && n == 0; ++i)
-        fast->white[i] /= fast_line(fast->factor, i)[i];
-    if (n > 0)
-        fast_whiten(fast->factor, fast->white, rows);
+    fast_whiten(fast->factor, fast->white, rows);
     return fast_dot(fast->white, fast->white, rows);
 }
 
 void eits_fast_update(eits_fast *fast, uint32_t rows)
 {
     const uint32_t n = FAST_SIZE * fast->count;
-    for (uint32_t i = 0; i < rows; ++i) {
+    for (uint32_t i = 0; i < rows && n > 0; ++i) {
         eits_real *w = fast->moved + (size_t)FAST_NUMBERS * i;
         const eits_real *line = fast_line(fast->factor, i);
         for (uint32_t j = 0; j < i; ++j)
@@ -129,8 +146,10 @@ void eits_fast_update(eits_fast *fast, uint32_t rows)
         fast_axpy(fast->state, fast->white[i], w, n);
         /* Every element of P is written, not one half and its mirror: both halves get the same
          * products in the same order, so that P stays symmetric to the bit. */
-        for (uint32_t k = 0; k < n; ++k)
-            fast_axpy(fast->p[k], -w[k], w, n);
+        for (uint32_t k = 0; k < n; ++k) {
+            if (w[k] != 0) /* the speed of a still touch is */
+                fast_axpy(fast->p[k], -w[k], w, n);
+        }
     }
 }
 

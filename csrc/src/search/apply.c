@@ -6,7 +6,7 @@
 static void end(eits_fast *fast, const fast_trial *trial)
 {
     for (uint32_t n = fast->search.from + trial->from; n < fast->ring_count; ++n)
-        fast->drive[fast->ring[n].drive].explained = 1;
+        fast->drive[fast->ring[n]->drive].explained = 1;
     eits_fast_empty_ring(fast);
 }
 

@@ -9,8 +9,8 @@ static int one_is_not_enough(const eits_fast *fast)
            !eits_search_changed(fast, FAST_REPLACE);
 }
 
-/* What is looked for beside one new touch takes turns: two of them, or anything else; again what the
- * last search would have acted on. */
+/* What is looked for beside one new touch takes turns: two of them, or anything else; again what
+ * the last search would have acted on. */
 static int odd(const eits_fast *fast)
 {
     const fast_search *s = &fast->search;
@@ -179,7 +179,7 @@ static void run_beside(eits_fast *fast)
         return;
     eits_fast_look(fast, place, fast->rho2, disc, &sight);
     for (uint32_t n = count - 1; n < count; ++n) {
-        const fast_held *held = &fast->ring[fast->search.from + n];
+        const fast_held *held = fast->ring[fast->search.from + n];
         eits_trial_answer(fast, held, disc, &sight, FAST_NONE, fast->search.ways);
         eits_fast_map(fast, held, fast->search.ways, fast->search.pair_score);
     }

@@ -31,7 +31,7 @@ void eits_trial_add_new(fast_trial *trial, const eits_real *place, int moves)
 void eits_trial_add_known(const eits_fast *fast, fast_trial *trial, uint32_t k)
 {
     /* a later beginning leaves more room for what came before it */
-    const eits_real late = fast_between_s(fast->ring[fast->search.from].time_us,
+    const eits_real late = fast_between_s(fast->ring[fast->search.from]->time_us,
                                           search_drive(fast, trial, 0)->time_us);
     const eits_real offset = EITS_FAST_MOVE_MM + R(0.3) * EITS_FAST_MOVE_SPEED * late;
     const eits_real speed = fast->known[k].moving ? EITS_FAST_TURN_SPEED : EITS_FAST_MOVE_SPEED;

@@ -7,7 +7,7 @@ static uint32_t cost_of_map(const eits_fast *fast)
     uint32_t open = 0;
     const uint32_t from = fast->search.count - search_last(fast, EITS_FAST_MAP_DRIVES);
     for (uint32_t n = from; n < fast->search.count; ++n)
-        open += !fast->ring[fast->search.from + n].mapped;
+        open += !fast->ring[fast->search.from + n]->mapped;
     return EITS_FAST_MAP_ANSWERS * open;
 }
 
@@ -17,7 +17,7 @@ static void run_map(eits_fast *fast)
     const uint32_t from = fast->search.count - search_last(fast, EITS_FAST_MAP_DRIVES);
     fast->search.spent += cost_of_map(fast);
     for (uint32_t n = from; n < fast->search.count; ++n) {
-        fast_held *held = &fast->ring[fast->search.from + n];
+        fast_held *held = fast->ring[fast->search.from + n];
         if (held->mapped)
             continue;
         for (uint32_t cell = 0; cell < fast->cells; ++cell)
@@ -63,7 +63,7 @@ static int begin(eits_fast *fast)
         return 0;
     s->count = fast->held_count < EITS_FAST_SEARCHED ? fast->held_count : EITS_FAST_SEARCHED;
     s->from = fast->ring_count - s->count;
-    if (fast->ring[s->from].chi2 > EITS_FAST_SUDDEN) {
+    if (fast->ring[s->from]->chi2 > EITS_FAST_SUDDEN) {
         ++s->from;
         --s->count;
     }

@@ -25,7 +25,7 @@ int eits_search(eits_fast *fast);
 static inline const fast_held *search_drive(const eits_fast *fast, const fast_trial *trial,
                                             uint32_t n)
 {
-    return &fast->ring[fast->search.from + trial->from + n];
+    return fast->ring[fast->search.from + trial->from + n];
 }
 
 static inline fast_trial *search_trial(eits_fast *fast, fast_which which)
