@@ -84,14 +84,22 @@ static eits_real innovate_alone(eits_fast *fast, uint32_t rows)
     return fast_dot(fast->white, fast->white, rows);
 }
 
-/* Onto row i's P h', for touch k. */
-static inline void add_moved(const eits_fast *fast, uint32_t k, const eits_real h[3], uint32_t n,
-                             eits_real *moved)
+/* P h' of a row: the columns that are not zero, of which a still touch has no speeds. */
+static inline void move_row(const eits_fast *fast, eits_real (*h)[3], eits_real *moved)
 {
-    const eits_real *p = fast->p[FAST_SIZE * k];
-    for (uint32_t c = 0; c < n; ++c, ++p)
-        moved[c] = eits_fma(h[2], p[2 * FAST_NUMBERS],
-                            eits_fma(h[1], p[FAST_NUMBERS], eits_fma(h[0], p[0], moved[c])));
+    for (uint32_t l = 0; l < fast->count; ++l) {
+        const uint32_t last = FAST_SIZE * l + (fast->known[l].moving ? FAST_SIZE : FAST_WAYS);
+        for (uint32_t c = FAST_SIZE * l; c < last; ++c) {
+            const eits_real *p = fast->p[0] + c;
+            eits_real sum = 0;
+            for (uint32_t k = 0; k < fast->count; ++k, p += FAST_SIZE * FAST_NUMBERS) {
+                sum = eits_fma(h[k][0], p[0], sum);
+                sum = eits_fma(h[k][1], p[FAST_NUMBERS], sum);
+                sum = eits_fma(h[k][2], p[2 * FAST_NUMBERS], sum);
+            }
+            moved[c] = sum;
+        }
+    }
 }
 
 eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
@@ -110,8 +118,7 @@ eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
         if (fast->used[i]) {
             fast->e[i] = fast->z[i] - fast->h[i] - fast->learned[i];
             row_of_h(fast, i, h);
-            for (uint32_t k = 0; k < fast->count; ++k)
-                add_moved(fast, k, h[k], n, moved);
+            move_row(fast, h, moved);
             /* S_ij = h_i P h_j', of which P h_j' stands in `moved`: only the three numbers of a
              * touch that a row can see are multiplied, not all five. */
             for (uint32_t j = 0; j <= i; ++j) {
@@ -144,12 +151,14 @@ void eits_fast_update(eits_fast *fast, uint32_t rows)
         for (uint32_t k = 0; k < n; ++k)
             w[k] /= line[i];
         fast_axpy(fast->state, fast->white[i], w, n);
-        /* Every element of P is written, not one half and its mirror: both halves get the same
-         * products in the same order, so that P stays symmetric to the bit. */
         for (uint32_t k = 0; k < n; ++k) {
             if (w[k] != 0) /* the speed of a still touch is */
-                fast_axpy(fast->p[k], -w[k], w, n);
+                fast_axpy(fast->p[k], -w[k], w, k + 1);
         }
+    }
+    for (uint32_t k = 1; k < n; ++k) {
+        for (uint32_t l = 0; l < k; ++l)
+            fast->p[l][k] = fast->p[k][l];
     }
 }
 
