@@ -37,7 +37,8 @@ typedef struct fast_sight {
     eits_real z[2], radius;
 } fast_sight;
 
-/* What the last frame said of a touch: it did not show it, near where drives had it, or elsewhere. */
+/* What the last frame said of a touch: it did not show it, near where drives had it, or elsewhere.
+ */
 typedef enum fast_last { FAST_NOT_SEEN, FAST_AGREED, FAST_ELSEWHERE } fast_last;
 
 /* A touch beside its state. */
@@ -273,10 +274,13 @@ void eits_fast_forget_errors(eits_fast *fast, uint32_t drive);
 
 /* dt on: places follow speeds, and all grows less sure. */
 void eits_fast_predict(eits_fast *fast, eits_real dt_s);
-/* Each strength may have changed by this fraction of its greatest at once. */
-void eits_fast_loosen(eits_fast *fast, eits_real strength);
 /* white, e, factor and moved of z where it is used; chi^2. eits_fast_expect must be the drive's. */
 eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows);
+/* The same where each strength may have changed at once, by a deviation of which `share2` is the
+ * square, as a fraction of its greatest. */
+eits_real eits_fast_loosen(eits_fast *fast, uint32_t rows, eits_real share2);
+/* L of L L' + x x' in place of L; x is spent. */
+void eits_fast_grow(eits_real *factor, eits_real *x, uint32_t rows);
 /* Believe the rows: `white` as it is now; `moved` is spent. */
 void eits_fast_update(eits_fast *fast, uint32_t rows);
 /* A touch, of which nothing is known that others share; `covariance` of x, y, strength, speeds. */

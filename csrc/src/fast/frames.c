@@ -263,8 +263,8 @@ static void put(eits_fast *fast, uint32_t k, const eits_real *before, const eits
 }
 
 /* A touch that two frames on end show elsewhere is put there. If drives explain a frame, a touch
- * that moves is theirs; if they do not, it may have gone on between the two frames, and the first of
- * them may still have agreed. */
+ * that moves is theirs; if they do not, it may have gone on between the two frames, and the first
+ * of them may still have agreed. */
 static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_real c)
 {
     fast_known *known = &fast->known[k];
@@ -275,8 +275,8 @@ static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_re
     const int again = (before == FAST_ELSEWHERE || lost) && by < fast_square(reach);
     known->frames_missed = 0;
     known->last = fast_distance2(place, known->at) < fast_square(EITS_FAST_AGREE_MM)
-                           ? FAST_AGREED
-                           : FAST_ELSEWHERE;
+                      ? FAST_AGREED
+                      : FAST_ELSEWHERE;
     if (known->last == FAST_AGREED)
         known->confirmed = 1;
     else if (again && !(known->moving && fast->frame_explained))

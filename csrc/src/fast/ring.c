@@ -3,22 +3,6 @@
  * lifts is no news to a hypothesis. */
 #include "fast/fast.h"
 
-/* L of L L' + x x'; x is spent (Gill, Golub, Murray and Saunders, Math. Comp. 28 (1974) 505). */
-static void grow(eits_real *factor, eits_real *x, uint32_t rows)
-{
-    for (uint32_t k = 0; k < rows; ++k) {
-        eits_real *pivot = fast_line(factor, k) + k;
-        const eits_real root = eits_sqrt(fast_square(*pivot) + fast_square(x[k]));
-        const eits_real c = root / *pivot, s = x[k] / *pivot;
-        *pivot = root;
-        for (uint32_t i = k + 1; i < rows; ++i) {
-            eits_real *below = fast_line(factor, i) + k;
-            *below = eits_fma(s, x[i], *below) / c;
-            x[i] = eits_fma(-s, *below, c * x[i]);
-        }
-    }
-}
-
 /* Whitens an answer and its slopes together. */
 void eits_fast_whiten_ways(const fast_held *held, uint32_t stride, uint32_t rows, eits_real *answer)
 {
@@ -91,7 +75,7 @@ static void whiten(eits_fast *fast, fast_held *held)
     for (uint32_t k = 0; k < held->count && !held->loose; ++k) {
         for (uint32_t i = 0; i < count; ++i)
             fast->spare[i] = fast->known[k].peak * held->known[size * k + i];
-        grow(held->factor, fast->spare, count);
+        eits_fast_grow(held->factor, fast->spare, count);
     }
     fast_whiten(held->factor, held->white, count);
     held->chi2 = fast_dot(held->white, held->white, count);

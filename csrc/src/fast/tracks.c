@@ -42,14 +42,6 @@ void eits_fast_predict(eits_fast *fast, eits_real dt_s)
     }
 }
 
-void eits_fast_loosen(eits_fast *fast, eits_real strength)
-{
-    for (uint32_t k = 0; k < fast->count; ++k) {
-        const uint32_t c = FAST_SIZE * k + FAST_C;
-        fast->p[c][c] += fast_square(strength * fast->known[k].peak);
-    }
-}
-
 /* Row i of H, by touch the derivatives by x, y and strength. */
 static void row_of_h(const eits_fast *fast, uint32_t i, eits_real h[EITS_FAST_MAX_TOUCHES][3])
 {
@@ -102,6 +94,14 @@ static inline void move_row(const eits_fast *fast, eits_real (*h)[3], eits_real 
     }
 }
 
+/* chi^2 of what is new in the rows. */
+static eits_real whiten_news(eits_fast *fast, uint32_t rows)
+{
+    eits_copy(fast->white, fast->e, rows);
+    fast_whiten(fast->factor, fast->white, rows);
+    return fast_dot(fast->white, fast->white, rows);
+}
+
 eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
 {
     const uint32_t n = FAST_SIZE * fast->count;
@@ -135,9 +135,40 @@ eits_real eits_fast_innovate(eits_fast *fast, uint32_t rows)
         }
         factor_row(fast, i, diagonal);
     }
-    eits_copy(fast->white, fast->e, rows);
-    fast_whiten(fast->factor, fast->white, rows);
-    return fast_dot(fast->white, fast->white, rows);
+    return whiten_news(fast, rows);
+}
+
+/* After Gill, Golub, Murray and Saunders, Math. Comp. 28 (1974) 505. */
+void eits_fast_grow(eits_real *factor, eits_real *x, uint32_t rows)
+{
+    for (uint32_t k = 0; k < rows; ++k) {
+        eits_real *pivot = fast_line(factor, k) + k;
+        const eits_real root = eits_sqrt(fast_square(*pivot) + fast_square(x[k]));
+        const eits_real c = root / *pivot, s = x[k] / *pivot;
+        *pivot = root;
+        for (uint32_t i = k + 1; i < rows; ++i) {
+            eits_real *below = fast_line(factor, i) + k;
+            *below = eits_fma(s, x[i], *below) / c;
+            x[i] = eits_fma(-s, *below, c * x[i]);
+        }
+    }
+}
+
+eits_real eits_fast_loosen(eits_fast *fast, uint32_t rows, eits_real share2)
+{
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        const uint32_t c = FAST_SIZE * k + FAST_C;
+        const eits_real *answer = fast->answer + FAST_WAYS * (size_t)fast->most_rows * k;
+        const eits_real more = share2 * fast_square(fast->known[k].peak), root = eits_sqrt(more);
+        fast->p[c][c] += more;
+        for (uint32_t i = 0; i < rows; ++i) {
+            const eits_real own = fast->used[i] ? answer[i] : 0;
+            fast->moved[(size_t)FAST_NUMBERS * i + c] += more * own;
+            fast->spare[i] = root * own;
+        }
+        eits_fast_grow(fast->factor, fast->spare, rows);
+    }
+    return whiten_news(fast, rows);
 }
 
 void eits_fast_update(eits_fast *fast, uint32_t rows)
