@@ -309,7 +309,9 @@ void eits_fast_keep(eits_fast *fast, uint32_t drive, uint32_t rows, int news);
 /* A new touch's answer and its slopes, whitened as the drive is. */
 void eits_fast_whiten_ways(const fast_held *held, uint32_t stride, uint32_t rows,
                            eits_real *answer);
-/* The drives before wait too: together they say what none of them said. */
+/* Rows and answers of a drive that waits, whitened. */
+void eits_fast_whiten_held(eits_fast *fast, fast_held *held);
+/* The drives before wait too: together they say what none of them said. A search whitens them. */
 void eits_fast_hold_all(eits_fast *fast);
 /* Nothing waits, and the drives before are no more: touches have changed. */
 void eits_fast_empty_ring(eits_fast *fast);

@@ -68,7 +68,7 @@ static void take_raw(const eits_fast *fast, fast_held *held, uint32_t count)
 
 /* Each strength may have changed by all of its greatest: a known touch that presses harder or lifts
  * is no news to a hypothesis. Of news that is so already. */
-static void whiten(eits_fast *fast, fast_held *held)
+void eits_fast_whiten_held(eits_fast *fast, fast_held *held)
 {
     const uint32_t count = fast->drive[held->drive].count;
     const size_t size = FAST_WAYS * (size_t)fast->most_rows;
@@ -82,7 +82,6 @@ static void whiten(eits_fast *fast, fast_held *held)
     for (uint32_t k = 0; k < held->count; ++k)
         eits_fast_whiten_ways(held, fast->most_rows, count, held->known + size * k);
     held->ready = 1;
-    fast->search.owed += held->count / 2u;
 }
 
 void eits_fast_keep(eits_fast *fast, uint32_t drive, uint32_t rows, int news)
@@ -104,7 +103,7 @@ void eits_fast_keep(eits_fast *fast, uint32_t drive, uint32_t rows, int news)
     if (!news && fast->held_count == 0)
         return;
     fast->held_count += fast->held_count < EITS_FAST_HELD;
-    whiten(fast, held);
+    eits_fast_whiten_held(fast, held);
     if (begins)
         eits_zero(fast->score, fast->cells);
     /* It may have been measured while a touch landed, and then tells of a wrong place. */
@@ -115,11 +114,8 @@ void eits_fast_hold_all(eits_fast *fast)
 {
     fast->held_count = fast->ring_count < EITS_FAST_HELD ? fast->ring_count : EITS_FAST_HELD;
     eits_zero(fast->score, fast->cells);
-    for (uint32_t n = fast->ring_count - fast->held_count; n < fast->ring_count; ++n) {
+    for (uint32_t n = fast->ring_count - fast->held_count; n < fast->ring_count; ++n)
         fast->ring[n]->mapped = 0;
-        if (!fast->ring[n]->ready)
-            whiten(fast, fast->ring[n]);
-    }
 }
 
 void eits_fast_empty_ring(eits_fast *fast)

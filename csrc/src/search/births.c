@@ -22,12 +22,12 @@ static int odd(const eits_fast *fast)
 
 static uint32_t cost_of_one(const eits_fast *fast)
 {
-    return 3 * fast->search.count;
+    return fast->search.count;
 }
 
 static uint32_t cost_of_rival(const eits_fast *fast)
 {
-    return search_one(fast)->exists && !eits_search_clear(fast) ? 2 * fast->search.count : 0;
+    return search_one(fast)->exists && !eits_search_clear(fast) ? fast->search.count : 0;
 }
 
 /* The last searches may have come to a better place near there. */
@@ -42,15 +42,13 @@ static void warmer(const eits_fast *fast, eits_real *place)
     }
 }
 
-static int start(eits_fast *fast, const eits_real *place, uint32_t count, uint32_t steps,
-                 fast_trial *trial)
+static void start(eits_fast *fast, const eits_real *place, uint32_t count, uint32_t steps,
+                  fast_trial *trial)
 {
     eits_trial_begin(fast, trial, count);
     eits_trial_add_new(trial, place, 0);
-    if (!eits_trial_say(fast, trial))
-        return 0;
+    (void)eits_trial_say(fast, trial);
     eits_trial_refine(fast, trial, steps);
-    return 1;
 }
 
 static void swap(eits_fast *fast, fast_which a, fast_which b)
@@ -61,7 +59,7 @@ static void swap(eits_fast *fast, fast_which a, fast_which b)
     *search_trial(fast, b) = *next;
 }
 
-static void run_one(eits_fast *fast)
+static void look_for_one(eits_fast *fast)
 {
     fast_search *s = &fast->search;
     eits_real from[2];
@@ -69,21 +67,30 @@ static void run_one(eits_fast *fast)
         return;
     eits_copy(from, s->peak, 2);
     warmer(fast, from);
+    start(fast, from, s->count, 2, search_trial(fast, FAST_ONE));
+}
+
+static void end_one(eits_fast *fast)
+{
     fast_trial *one = search_trial(fast, FAST_ONE);
-    if (start(fast, from, s->count, 2, one))
-        one->lead = one->all - one->left;
+    one->lead = one->all - one->left;
 }
 
 /* The next peak of the map is its rival, and takes its place if it explains more. */
-static void run_rival(eits_fast *fast)
+static void look_for_rival(eits_fast *fast)
 {
     fast_search *s = &fast->search;
-    fast_trial *one = search_trial(fast, FAST_ONE), *rival = search_trial(fast, FAST_RIVAL);
     eits_real from[2];
     if (eits_fast_peak(fast, fast->score, (const eits_real(*)[2])s->peak, 1, from)) {
         warmer(fast, from);
-        (void)start(fast, from, s->count, 1, rival);
+        start(fast, from, s->count, 1, search_trial(fast, FAST_RIVAL));
     }
+}
+
+static void end_rival(eits_fast *fast)
+{
+    fast_search *s = &fast->search;
+    fast_trial *one = search_trial(fast, FAST_ONE), *rival = search_trial(fast, FAST_RIVAL);
     if (rival->exists && rival->left < one->left)
         swap(fast, FAST_ONE, FAST_RIVAL);
     s->warm_count = 0;
@@ -101,15 +108,19 @@ static void run_rival(eits_fast *fast)
 /* More steps where it leaves more than noise and they may help. */
 static uint32_t cost_of_more(const eits_fast *fast)
 {
-    return one_is_not_enough(fast) ? 2 * fast->search.count : 0;
+    return one_is_not_enough(fast) ? fast->search.count : 0;
 }
 
-static void run_more(eits_fast *fast)
+static void ask_for_more(eits_fast *fast)
+{
+    fast->search.before = search_one(fast)->left;
+    eits_trial_refine(fast, search_trial(fast, FAST_ONE), 2);
+}
+
+static void end_more(eits_fast *fast)
 {
     fast_trial *one = search_trial(fast, FAST_ONE);
-    const eits_real before = one->left;
-    eits_trial_refine(fast, one, 2);
-    one->lead += before - one->left;
+    one->lead += fast->search.before - one->left;
     eits_copy(fast->search.warm[0], one->body[0].p, 2);
 }
 
@@ -119,33 +130,43 @@ static uint32_t cost_of_late(const eits_fast *fast)
 {
     uint32_t k;
     return one_is_not_enough(fast) && odd(fast) && !eits_search_near(fast, &k)
-               ? 4 * (fast->search.count - 1)
+               ? fast->search.count - 1
                : 0;
 }
 
 /* The first drive may have been measured while the touch landed. */
-static void run_late(eits_fast *fast)
+static void look_for_late(eits_fast *fast)
+{
+    start(fast, search_one(fast)->body[0].p, fast->search.count - 1, 3,
+          search_trial(fast, FAST_LATE));
+}
+
+static void end_late(eits_fast *fast)
 {
     fast_trial *trial = search_trial(fast, FAST_LATE);
-    if (start(fast, search_one(fast)->body[0].p, fast->search.count - 1, 3, trial))
-        trial->lead = trial->all - trial->left;
+    trial->lead = trial->all - trial->left;
     if (search_one(fast)->lead < trial->lead)
         trial->lead = search_one(fast)->lead;
 }
 
 static uint32_t cost_of_swift(const eits_fast *fast)
 {
-    return one_is_not_enough(fast) && odd(fast) ? 5 * search_last(fast, EITS_FAST_SHORT_DRIVES) : 0;
+    return one_is_not_enough(fast) && odd(fast) ? search_last(fast, EITS_FAST_SHORT_DRIVES) : 0;
 }
 
-static void run_swift(eits_fast *fast)
+static void look_for_swift(eits_fast *fast)
 {
     fast_trial *trial = search_trial(fast, FAST_SWIFT);
-    eits_real covariance[FAST_FIT][FAST_FIT];
     eits_trial_begin(fast, trial, EITS_FAST_SHORT_DRIVES);
     eits_trial_add_new(trial, search_one(fast)->body[0].p, 1);
     (void)eits_trial_say(fast, trial);
     eits_trial_refine(fast, trial, 4);
+}
+
+static void end_swift(eits_fast *fast)
+{
+    fast_trial *trial = search_trial(fast, FAST_SWIFT);
+    eits_real covariance[FAST_FIT][FAST_FIT];
     if (!trial->exists || !eits_trial_covariance(trial, covariance)) {
         trial->exists = 0;
         return;
@@ -164,13 +185,13 @@ static void run_swift(eits_fast *fast)
 
 static uint32_t cost_of_beside(const eits_fast *fast)
 {
-    return one_is_not_enough(fast) && !odd(fast) ? EITS_FAST_MAP_ANSWERS : 0;
+    return one_is_not_enough(fast) && !odd(fast) ? EITS_FAST_MAP_ANSWERS + 1 : 0;
 }
 
 /* The map beside the best one, of the last drive. */
-static void run_beside(eits_fast *fast)
+static void map_beside(eits_fast *fast)
 {
-    const uint32_t count = fast->search.count;
+    const fast_held *held = fast->ring[fast->search.from + fast->search.count - 1];
     const eits_real *place = search_one(fast)->body[0].p;
     fast_sight sight = {.field = fast->search.fields};
     fast_disc *disc = &fast->search.disc[0];
@@ -178,17 +199,14 @@ static void run_beside(eits_fast *fast)
     if (!eits_fast_gather(fast, place, fast->rho2, disc))
         return;
     eits_fast_look(fast, place, fast->rho2, disc, &sight);
-    for (uint32_t n = count - 1; n < count; ++n) {
-        const fast_held *held = fast->ring[fast->search.from + n];
-        eits_trial_answer(fast, held, disc, &sight, FAST_NONE, fast->search.ways);
-        eits_fast_map(fast, held, fast->search.ways, fast->search.pair_score);
-    }
-    fast->search.spent += EITS_FAST_MAP_ANSWERS;
+    eits_trial_answer(fast, held, disc, &sight, FAST_NONE, fast->search.ways);
+    eits_fast_map(fast, held, fast->search.ways, fast->search.pair_score);
+    fast->search.spent += EITS_FAST_MAP_ANSWERS + 1;
 }
 
 static uint32_t cost_of_pair(const eits_fast *fast)
 {
-    return one_is_not_enough(fast) && !odd(fast) ? 6 * search_last(fast, EITS_FAST_SHORT_DRIVES)
+    return one_is_not_enough(fast) && !odd(fast) ? 2 * search_last(fast, EITS_FAST_SHORT_DRIVES)
                                                  : 0;
 }
 
@@ -210,24 +228,46 @@ static void try_pair(eits_fast *fast, const eits_real *a, const eits_real *b)
     }
 }
 
-static void run_pair_starts(eits_fast *fast)
+/* The best one, with the peak of the map beside it. */
+static void try_beside(eits_fast *fast)
 {
-    fast_search *s = &fast->search;
     const eits_real *first = search_one(fast)->body[0].p;
     eits_real second[2];
-    if (eits_fast_peak(fast, s->pair_score, (const eits_real(*)[2])first, 1, second))
+    if (eits_fast_peak(fast, fast->search.pair_score, (const eits_real(*)[2])first, 1, second))
         try_pair(fast, first, second);
-    if (s->pair_known && s->decisions - s->pair_at <= 3) {
-        try_pair(fast, s->pair[0], s->pair[1]);
-        return;
-    }
-    for (uint32_t axis = 0; axis < 2; ++axis) {
-        const eits_real by[2] = {axis == 0 ? EITS_FAST_HALF_PAIR_MM : 0,
-                                 axis == 1 ? EITS_FAST_HALF_PAIR_MM : 0};
-        const eits_real a[2] = {first[0] + by[0], first[1] + by[1]};
-        const eits_real b[2] = {first[0] - by[0], first[1] - by[1]};
-        try_pair(fast, a, b);
-    }
+}
+
+/* The places that the last search for a pair came to serve for a while. */
+static int pair_is_known(const eits_fast *fast)
+{
+    return fast->search.pair_known && fast->search.decisions - fast->search.pair_at <= 3;
+}
+
+/* One at each side of the best one. */
+static void try_about(eits_fast *fast, eits_real x_mm, eits_real y_mm)
+{
+    const eits_real *middle = search_one(fast)->body[0].p;
+    const eits_real a[2] = {middle[0] + x_mm, middle[1] + y_mm};
+    const eits_real b[2] = {middle[0] - x_mm, middle[1] - y_mm};
+    try_pair(fast, a, b);
+}
+
+static void try_along_x(eits_fast *fast)
+{
+    if (pair_is_known(fast))
+        try_pair(fast, fast->search.pair[0], fast->search.pair[1]);
+    else
+        try_about(fast, EITS_FAST_HALF_PAIR_MM, 0);
+}
+
+static uint32_t cost_along_y(const eits_fast *fast)
+{
+    return pair_is_known(fast) ? 0 : cost_of_pair(fast);
+}
+
+static void try_along_y(eits_fast *fast)
+{
+    try_about(fast, 0, EITS_FAST_HALF_PAIR_MM);
 }
 
 /* The same pair, in either order. */
@@ -242,13 +282,17 @@ static int same_pair(const fast_trial *a, const fast_trial *b)
     return 0;
 }
 
-static void run_pair(eits_fast *fast)
+static void refine_pair(eits_fast *fast)
+{
+    eits_trial_refine(fast, search_trial(fast, FAST_PAIR), 3);
+}
+
+static void end_pair(eits_fast *fast)
 {
     fast_search *s = &fast->search;
     fast_trial *best = search_trial(fast, FAST_PAIR), *rival = search_trial(fast, FAST_PAIR_RIVAL);
     if (!best->exists)
         return;
-    eits_trial_refine(fast, best, 3);
     for (uint32_t n = 0; n < 2; ++n)
         eits_copy(s->pair[n], best->body[n].p, 2);
     s->pair_known = 1;
@@ -264,11 +308,11 @@ static uint32_t cost_of_split(const eits_fast *fast)
     uint32_t k;
     return one_is_not_enough(fast) && odd(fast) && eits_search_near(fast, &k) &&
                    fast->known[k].age < EITS_FAST_YOUNG
-               ? 6 * search_last(fast, EITS_FAST_SHORT_DRIVES)
+               ? 2 * search_last(fast, EITS_FAST_SHORT_DRIVES)
                : 0;
 }
 
-static void run_split(eits_fast *fast)
+static void look_for_split(eits_fast *fast)
 {
     fast_trial *trial = search_trial(fast, FAST_SPLIT);
     const eits_real *other = search_one(fast)->body[0].p;
@@ -284,6 +328,11 @@ static void run_split(eits_fast *fast)
     trial->gone = (uint8_t)k;
     (void)eits_trial_say(fast, trial);
     eits_trial_refine(fast, trial, 2);
+}
+
+static void end_split(eits_fast *fast)
+{
+    fast_trial *trial = search_trial(fast, FAST_SPLIT);
     trial->lead = trial->all;
 }
 
@@ -293,11 +342,11 @@ static uint32_t cost_of_both(const eits_fast *fast)
 {
     const fast_trial *move = &fast->search.trial[FAST_MOVE];
     return one_is_not_enough(fast) && odd(fast) && move->exists && move->bodies == 1
-               ? 3 * 2 * search_last(fast, EITS_FAST_LAST_DRIVES)
+               ? 2 * search_last(fast, EITS_FAST_LAST_DRIVES)
                : 0;
 }
 
-static void run_both(eits_fast *fast)
+static void look_for_both(eits_fast *fast)
 {
     const fast_trial *move = search_trial(fast, FAST_MOVE);
     fast_trial *trial = search_trial(fast, FAST_BOTH);
@@ -309,14 +358,45 @@ static void run_both(eits_fast *fast)
     eits_trial_add_new(trial, search_one(fast)->body[0].p, 0);
     (void)eits_trial_say(fast, trial);
     eits_trial_refine(fast, trial, 2);
-    trial->lead = trial->all;
 }
 
-const search_piece eits_piece_one = {cost_of_one, run_one};
-const search_piece eits_piece_rival = {cost_of_rival, run_rival};
-const search_piece eits_piece_more = {cost_of_more, run_more};
-const search_piece eits_pieces_birth[7] = {
-    {cost_of_late, run_late},        {cost_of_swift, run_swift}, {cost_of_beside, run_beside},
-    {cost_of_pair, run_pair_starts}, {cost_of_pair, run_pair},   {cost_of_split, run_split},
-    {cost_of_both, run_both},
+static void end_both(eits_fast *fast)
+{
+    fast_trial *trial = search_trial(fast, FAST_BOTH);
+    trial->lead = trial->all;
+    fast->search.alone = -1;
+}
+
+static uint32_t cost_of_alone(const eits_fast *fast)
+{
+    const fast_trial *both = &fast->search.trial[FAST_BOTH];
+    return both->exists ? both->count : 0;
+}
+
+/* What the moves alone leave of the same drives. */
+static void look_alone(eits_fast *fast)
+{
+    fast_trial *alone = &fast->search.scratch;
+    *alone = *search_trial(fast, FAST_BOTH);
+    --alone->bodies;
+    alone->fresh = 0;
+    (void)eits_trial_say(fast, alone);
+    eits_trial_refine(fast, alone, 2);
+}
+
+static void end_alone(eits_fast *fast)
+{
+    const fast_trial *alone = &fast->search.scratch;
+    fast->search.alone = alone->exists ? alone->left : -1;
+}
+
+const search_piece eits_piece_one = {cost_of_one, look_for_one, end_one};
+const search_piece eits_piece_rival = {cost_of_rival, look_for_rival, end_rival};
+const search_piece eits_piece_more = {cost_of_more, ask_for_more, end_more};
+const search_piece eits_pieces_birth[10] = {
+    {cost_of_late, look_for_late, end_late}, {cost_of_swift, look_for_swift, end_swift},
+    {cost_of_beside, map_beside, NULL},      {cost_of_pair, try_beside, NULL},
+    {cost_of_pair, try_along_x, NULL},       {cost_along_y, try_along_y, NULL},
+    {cost_of_pair, refine_pair, end_pair},   {cost_of_split, look_for_split, end_split},
+    {cost_of_both, look_for_both, end_both}, {cost_of_alone, look_alone, end_alone},
 };

@@ -66,9 +66,12 @@
  * one that jumps; smaller: fast swipes are lost */
 #define EITS_FAST_SPEED_MOST R(1500.0)
 
-/* of a place in a drive, that a drive may spend on a search, some 5,000 instructions each; the next
- * drive goes on with it [answers]. larger: a drive takes longer; smaller: touches come later */
-#define EITS_FAST_ANSWERS 40
+/* that a drive with a search may spend [answers of a place in a drive]. larger: drives take longer;
+ * smaller: searches do */
+#define EITS_FAST_ANSWERS 30
+
+/* fewer for each known touch, which take their own work [answers]. as FAST_ANSWERS */
+#define EITS_FAST_TOUCH_ANSWERS 3
 
 /* what the map of a drive costs [answers]. larger: fewer pieces of a search in a drive */
 #define EITS_FAST_MAP_ANSWERS 8

@@ -72,17 +72,10 @@ static void cost_births(eits_fast *fast)
 }
 
 /* What a birth beside moves must save of what the moves alone leave of the same drives. */
-static int beats_its_moves(eits_fast *fast, const fast_trial *both)
+static int beats_its_moves(const eits_fast *fast, const fast_trial *both)
 {
-    fast_trial *alone = &fast->search.scratch;
-    *alone = *both;
-    --alone->bodies;
-    alone->fresh = 0;
-    if (!eits_trial_say(fast, alone))
-        return 0;
-    eits_trial_refine(fast, alone, 2);
     const eits_real share = EITS_FAST_BIRTH_SHARE * (both->all - both->left);
-    return alone->left - both->left >
+    return fast->search.alone - both->left >
            eits_larger(EITS_FAST_BIRTH_MARGIN, share) + 2 * (eits_real)both->count;
 }
 

@@ -350,33 +350,49 @@ int eits_trial_say(eits_fast *fast, fast_trial *trial)
     }
     trial->exists = 1;
     /* beside the answers themselves, equations take a part of the work */
-    fast->search.spent += (uint32_t)trial->bodies * trial->count / (trial->as_known ? 4 : 1);
+    fast->search.spent += search_cost(trial, trial->bodies);
     return 1;
 }
 
 void eits_trial_refine(eits_fast *fast, fast_trial *trial, uint32_t steps)
 {
-    fast_trial *next = &fast->search.next;
-    eits_real shorter = 1, step[FAST_FIT];
-    for (; steps > 0 && trial->exists; --steps) {
-        const eits_real length = eits_trial_step(trial, shorter, step);
-        if (length < 0)
-            return;
-        *next = *trial;
-        next->as_known = 0;
-        for (uint32_t i = 0, at = 0; i < next->bodies; at += next->body[i++].numbers) {
-            for (uint32_t k = 0; k < next->body[i].numbers; ++k)
-                next->body[i].p[k] += step[at + k];
-        }
-        /* A shorter step from the same place costs one look; a line search would cost several, and
-         * the work of a drive is bounded. */
-        if (eits_trial_say(fast, next) && next->left < trial->left) {
-            *trial = *next;
-            shorter = 1;
-        } else {
-            shorter *= EITS_FAST_SHORTER;
-        }
-        if (length < EITS_FAST_SETTLED_MM)
-            return;
+    fast_search *s = &fast->search;
+    s->stepped = trial;
+    s->steps = trial->exists ? steps : 0;
+    s->shorter = 1;
+}
+
+/* The trial with its numbers moved by a step. */
+static void move_by(const fast_trial *trial, const eits_real *step, fast_trial *next)
+{
+    *next = *trial;
+    next->as_known = 0;
+    for (uint32_t i = 0, at = 0; i < next->bodies; at += next->body[i++].numbers) {
+        for (uint32_t k = 0; k < next->body[i].numbers; ++k)
+            next->body[i].p[k] += step[at + k];
     }
+}
+
+void eits_trial_take_step(eits_fast *fast)
+{
+    fast_search *s = &fast->search;
+    fast_trial *trial = s->stepped, *next = &s->next;
+    eits_real step[FAST_FIT];
+    const eits_real length = eits_trial_step(trial, s->shorter, step);
+    --s->steps;
+    if (length < 0) {
+        s->steps = 0;
+        return;
+    }
+    move_by(trial, step, next);
+    /* A shorter step from the same place costs one look; a line search would cost several, and the
+     * work of a drive is bounded. */
+    if (eits_trial_say(fast, next) && next->left < trial->left) {
+        *trial = *next;
+        s->shorter = 1;
+    } else {
+        s->shorter *= EITS_FAST_SHORTER;
+    }
+    if (length < EITS_FAST_SETTLED_MM)
+        s->steps = 0;
 }

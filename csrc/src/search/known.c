@@ -92,10 +92,10 @@ static void choose_moves(eits_fast *fast, uint32_t count, fast_trial *trial)
 
 static uint32_t cost_of_move(const eits_fast *fast)
 {
-    return any_on(fast) ? (3 + fast->count / 4) * fast->search.count : 0;
+    return any_on(fast) ? 4 + fast->count : 0;
 }
 
-static void run_move(eits_fast *fast)
+static void look_at_moves(eits_fast *fast)
 {
     fast_trial *trial = search_trial(fast, FAST_MOVE);
     choose_moves(fast, fast->search.count, trial);
@@ -108,23 +108,32 @@ static uint32_t cost_of_replace(const eits_fast *fast)
 {
     uint32_t k;
     return search_one(fast)->exists && !eits_search_clear(fast) && eits_search_near(fast, &k)
-               ? 2 * fast->search.count
+               ? 1 + fast->search.count / 6
                : 0;
 }
 
-/* A new touch in place of a known one; `trial` is refined from `place`. */
-static int instead(eits_fast *fast, uint32_t k, const eits_real *place, eits_real rho2, int moves,
-                   fast_trial *trial)
+/* A new touch in place of a known one, from `place` on. */
+static void look_instead(eits_fast *fast, uint32_t k, const eits_real *place, eits_real rho2,
+                         int moves)
 {
+    fast_trial *trial = &fast->search.scratch;
     eits_trial_begin(fast, trial, fast->search.count);
     eits_trial_add_new(trial, place, moves);
     trial->gone = (uint8_t)k;
     trial->rho2 = rho2;
     trial->as_known = !moves && rho2 == fast->known[k].rho2;
-    if (!eits_trial_say(fast, trial))
-        return 0;
+    (void)eits_trial_say(fast, trial);
     eits_trial_refine(fast, trial, 2);
-    const eits_real far = fast_distance2(trial->body[0].p, fast->state + FAST_SIZE * k);
+}
+
+/* It has come to a place that is near enough. */
+static int is_near(const eits_fast *fast, int moves)
+{
+    const fast_trial *trial = &fast->search.scratch;
+    if (!trial->exists)
+        return 0;
+    const eits_real far =
+        fast_distance2(trial->body[0].p, fast->state + (size_t)FAST_SIZE * trial->gone);
     const eits_real most = (moves ? 2 : 1) * EITS_FAST_APART_MM;
     return far < fast_square(most);
 }
@@ -153,30 +162,39 @@ static void keep_better(eits_fast *fast, fast_trial *trial)
         *best = *trial;
 }
 
-static void run_replace(eits_fast *fast)
+static void look_for_place(eits_fast *fast)
 {
-    fast_trial *trial = &fast->search.scratch;
     uint32_t k;
-    if (eits_search_near(fast, &k) &&
-        instead(fast, k, fast->state + FAST_SIZE * k, fast->known[k].rho2, 0, trial))
-        keep_better(fast, trial);
+    if (eits_search_near(fast, &k))
+        look_instead(fast, k, fast->state + FAST_SIZE * k, fast->known[k].rho2, 0);
+}
+
+static void end_instead(eits_fast *fast)
+{
+    if (is_near(fast, 0))
+        keep_better(fast, &fast->search.scratch);
 }
 
 static uint32_t cost_of_swerve(const eits_fast *fast)
 {
     const int wanted = fast->search.trial[FAST_REPLACE].exists && fast->search.count > 2 &&
                        !eits_search_clear(fast);
-    return wanted ? 3 * fast->search.count : 0;
+    return wanted ? fast->search.count : 0;
 }
 
-static void run_swerve(eits_fast *fast)
+static void look_for_swerve(eits_fast *fast)
+{
+    const fast_trial *still = search_trial(fast, FAST_REPLACE);
+    const uint32_t k = still->gone;
+    look_instead(fast, k, still->body[0].p, fast->known[k].rho2, 1);
+}
+
+static void end_swerve(eits_fast *fast)
 {
     fast_trial *trial = &fast->search.scratch;
     const fast_trial *still = search_trial(fast, FAST_REPLACE);
-    const uint32_t k = still->gone;
     eits_real covariance[FAST_FIT][FAST_FIT];
-    if (!instead(fast, k, still->body[0].p, fast->known[k].rho2, 1, trial) ||
-        !eits_trial_covariance(trial, covariance))
+    if (!is_near(fast, 1) || !eits_trial_covariance(trial, covariance))
         return;
     const eits_real *p = trial->body[0].p;
     const eits_real speed2 = fast_square(p[2]) + fast_square(p[3]);
@@ -192,33 +210,32 @@ static uint32_t cost_of_wider(const eits_fast *fast)
     uint32_t k;
     return fast->search.count > 4 && search_one(fast)->exists && !eits_search_clear(fast) &&
                    eits_search_near(fast, &k) && fast->known[k].age < EITS_FAST_WIDENS
-               ? 6 * fast->search.count
+               ? fast->search.count
                : 0;
 }
 
 static void try_wider(eits_fast *fast, eits_real rho)
 {
-    fast_trial *trial = &fast->search.scratch;
     uint32_t k;
-    if (eits_search_near(fast, &k) && fast_square(rho) != fast->known[k].rho2 &&
-        instead(fast, k, fast->state + FAST_SIZE * k, fast_square(rho), 0, trial))
-        keep_better(fast, trial);
+    fast->search.scratch.exists = 0;
+    if (eits_search_near(fast, &k) && fast_square(rho) != fast->known[k].rho2)
+        look_instead(fast, k, fast->state + FAST_SIZE * k, fast_square(rho), 0);
 }
 
-static void run_wide(eits_fast *fast)
+static void try_wide(eits_fast *fast)
 {
     try_wider(fast, EITS_FAST_RHO_WIDE_MM);
 }
 
-static void run_wider(eits_fast *fast)
+static void try_widest(eits_fast *fast)
 {
     try_wider(fast, EITS_FAST_RHO_WIDER_MM);
 }
 
-const search_piece eits_piece_move = {cost_of_move, run_move};
+const search_piece eits_piece_move = {cost_of_move, look_at_moves, NULL};
 const search_piece eits_pieces_change[4] = {
-    {cost_of_replace, run_replace},
-    {cost_of_swerve, run_swerve},
-    {cost_of_wider, run_wide},
-    {cost_of_wider, run_wider},
+    {cost_of_replace, look_for_place, end_instead},
+    {cost_of_swerve, look_for_swerve, end_swerve},
+    {cost_of_wider, try_wide, end_instead},
+    {cost_of_wider, try_widest, end_instead},
 };

@@ -1,21 +1,22 @@
 /* What becomes of drives that no known touch explains: hypotheses are fitted to those that wait,
  * and one is acted on when it beats the others by a margin (decide.c).
  *
- * A search has a fixed set of drives and a list of pieces of work (list.c), each of which is
- * bounded; a drive does pieces until EITS_FAST_ANSWERS are spent, and the next drive goes on. So
- * the work of a drive is bounded by construction, and a search takes the longer the more there is
- * to compare. */
+ * A search has a fixed set of drives and a list of pieces of work (list.c). A piece looks at one
+ * hypothesis, and may ask for steps that make it better. A drive does looks and steps as long as
+ * the next one fits into what the drive may spend, and the next drive goes on. So the work of a
+ * drive is bounded by construction, and a search takes the longer the more there is to compare. */
 #ifndef EITSKIN_SEARCH_H
 #define EITSKIN_SEARCH_H
 
 #include "fast/fast.h"
 #include "search/constants.h"
 
-/* One piece of a search: what it costs at most, in answers of a place in a drive, 0 where it is not
- * wanted; and its work. */
+/* One piece of a search: what its look costs at most, in answers of a place in a drive, 0 where it
+ * is not wanted; the look; and what is done after the steps that it asked for, NULL for nothing. */
 typedef struct search_piece {
     uint32_t (*cost)(const eits_fast *fast);
-    void (*run)(eits_fast *fast);
+    void (*look)(eits_fast *fast);
+    void (*end)(eits_fast *fast);
 } search_piece;
 
 /* list.c: go on with the search for an explanation of what waits; 1 where one was acted on. */
@@ -44,11 +45,19 @@ static inline uint32_t search_last(const eits_fast *fast, uint32_t most)
     return fast->search.count < most ? fast->search.count : most;
 }
 
+/* Answers that a look at `bodies` of the trial costs. Where known touches are as they were, their
+ * answers stand in the ring, and equations alone are made. */
+static inline uint32_t search_cost(const fast_trial *trial, uint32_t bodies)
+{
+    const uint32_t answers = bodies * trial->count;
+    return trial->as_known ? (answers + 5) / 6 : answers;
+}
+
 /* ---- known.c, births.c: pieces ---- */
 
 extern const search_piece eits_piece_move, eits_piece_one, eits_piece_rival, eits_piece_more;
 /* changes of known touches after a move, and births after the simple ones, in their order */
-extern const search_piece eits_pieces_change[4], eits_pieces_birth[7];
+extern const search_piece eits_pieces_change[4], eits_pieces_birth[10];
 /* The known touch that the best new one may be instead; 0: none is near. */
 int eits_search_near(const eits_fast *fast, uint32_t *k);
 /* Where the work is limited: a change of known touches leaves noise, and costs clearly less than a
@@ -66,9 +75,10 @@ void eits_trial_add_new(fast_trial *trial, const eits_real *place, int moves);
 void eits_trial_add_known(const eits_fast *fast, fast_trial *trial, uint32_t k);
 /* How the trial explains its drives; 0 where a place is off the skin. */
 int eits_trial_say(eits_fast *fast, fast_trial *trial);
-/* Up to `steps` damped Gauss-Newton steps from where it is, said before; only those that leave less
- * are taken. */
+/* Asks for up to `steps` damped Gauss-Newton steps from where it is, said before. */
 void eits_trial_refine(eits_fast *fast, fast_trial *trial, uint32_t steps);
+/* The next of them; it is taken if it leaves less. */
+void eits_trial_take_step(eits_fast *fast);
 /* The place of body `i`, without speed, at the trial's last drive. */
 void eits_trial_place(const eits_fast *fast, const fast_trial *trial, uint32_t i, eits_real *place);
 /* The whitened answer of a touch in a drive, with slopes and what known touches but `without` do to

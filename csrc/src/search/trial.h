@@ -1,5 +1,5 @@
 /* A hypothesis about drives that wait: known touches that have moved, and new touches, at most
- * three together; how it explains them, and what the search for the best one keeps from drive to
+ * two together; how it explains them, and what the search for the best one keeps from drive to
  * drive.
  */
 #ifndef EITSKIN_SEARCH_TRIAL_H
@@ -74,11 +74,16 @@ typedef enum fast_which {
 } fast_which;
 
 typedef struct fast_search {
-    uint32_t active, task;
-    uint32_t spent, owed; /* of this drive's work; by what was whitened before */
-    uint32_t from, count; /* drives of the ring that are explained */
-    uint32_t decisions;   /* searches that ended, ever */
+    uint32_t active, task, looked; /* looked: its task has begun */
+    uint32_t spent, most;          /* of this drive's work, and how much it may be */
+    uint32_t from, count;          /* drives of the ring that are explained */
+    uint32_t decisions;            /* searches that ended, ever */
     fast_trial trial[FAST_WHICH], scratch, next;
+    fast_trial *stepped; /* is made better, in so many steps more */
+    uint32_t steps;
+    eits_real shorter;
+    eits_real before; /* what the one new touch left before its last steps */
+    eits_real alone;  /* what moves leave without the new touch beside them; below 0: not known */
     fast_disc disc[FAST_BODIES];
     /* of a drive at hand: answers of bodies, what their numbers move of it; fields at bodies */
     eits_real *ways, *column, *fields, *rest;
