@@ -81,6 +81,15 @@ void eits_apply_move(eits_fast *fast, const fast_trial *trial)
         end(fast, trial);
 }
 
+/* A first touch may move from its contact on, as a swipe does, where nothing else can drag it. One
+ * that still grows is landing, and another may land beside it. */
+static int may_move(const eits_fast *fast, const fast_trial *trial, uint32_t which)
+{
+    const uint32_t last = trial->count - 1u, first = last > 1 ? 1 : 0;
+    return fast->count == 0 && trial->fresh == 1 &&
+           trial->strength[last][which] < EITS_FAST_GROWS * trial->strength[first][which];
+}
+
 /* The state and covariance of a new touch of the trial. */
 static void new_state(const eits_fast *fast, const fast_trial *trial, uint32_t i,
                       eits_real all[FAST_FIT][FAST_FIT], eits_real *state,
@@ -92,14 +101,13 @@ static void new_state(const eits_fast *fast, const fast_trial *trial, uint32_t i
     const eits_real c = trial->strength[trial->count - 1u][which];
     const eits_real dt =
         fast_between_s(search_drive(fast, trial, trial->count - 1u)->time_us, fast->time_us);
-    /* where nothing else may land beside it or drag it, a new touch may move */
-    const int moves = body->numbers == 4, alone = fast->count == 0 && trial->fresh == 1;
+    const int moves = body->numbers == 4;
     body_covariance(all, first_number(trial, i), body->numbers, dt, doubt, covariance);
     covariance[FAST_C][FAST_C] = doubt * trial->variance[which];
     add_doubt(covariance, EITS_FAST_BORN_MM, EITS_FAST_BORN_STRENGTH * c,
-              moves   ? EITS_FAST_BORN_SPEED
-              : alone ? EITS_FAST_FIRST_SPEED
-                      : 0);
+              moves                            ? EITS_FAST_BORN_SPEED
+              : may_move(fast, trial, which) ? EITS_FAST_FIRST_SPEED
+                                               : 0);
     state[FAST_C] = c;
     for (uint32_t axis = 0; axis < 2; ++axis) {
         state[axis] = body->p[axis] + (moves ? dt * body->p[2 + axis] : 0);

@@ -186,6 +186,10 @@
  * one that lands beside it; smaller: swipes are lost */
 #define EITS_FAST_FIRST_SPEED R(150.0)
 
+/* growth of a new touch in the drives that it is born from, below which it may move. larger: it is
+ * dragged by one that lands beside it; smaller: swipes are lost */
+#define EITS_FAST_GROWS R(1.3)
+
 /* least speed of a touch that is born in motion [mm/s]. larger: swipes begin late; smaller: noise
  * moves new touches */
 #define EITS_FAST_SWIFT_SPEED R(60.0)
