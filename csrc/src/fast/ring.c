@@ -3,19 +3,22 @@
  * lifts is no news to a hypothesis. */
 #include "fast/fast.h"
 
-/* Whitens an answer and its slopes together. */
+/* Whitens an answer and its slopes together: no loop over the three, so that each number of the
+ * factor is loaded once. */
 void eits_fast_whiten_ways(const fast_held *held, uint32_t stride, uint32_t rows, eits_real *answer)
 {
-    eits_real *v[FAST_WAYS] = {answer, answer + stride, answer + 2 * (size_t)stride};
+    eits_real *by_x = answer + stride, *by_y = by_x + stride;
     for (uint32_t i = 0; i < rows; ++i) {
         const eits_real *line = fast_line(held->factor, i);
-        eits_real sum[FAST_WAYS] = {0, 0, 0};
+        eits_real sum = 0, sum_x = 0, sum_y = 0;
         for (uint32_t j = held->count == 0 ? i : 0; j < i; ++j) {
-            for (uint32_t way = 0; way < FAST_WAYS; ++way)
-                sum[way] = eits_fma(line[j], v[way][j], sum[way]);
+            sum = eits_fma(line[j], answer[j], sum);
+            sum_x = eits_fma(line[j], by_x[j], sum_x);
+            sum_y = eits_fma(line[j], by_y[j], sum_y);
         }
-        for (uint32_t way = 0; way < FAST_WAYS; ++way)
-            v[way][i] = (v[way][i] - sum[way]) / line[i];
+        answer[i] = (answer[i] - sum) / line[i];
+        by_x[i] = (by_x[i] - sum_x) / line[i];
+        by_y[i] = (by_y[i] - sum_y) / line[i];
     }
 }
 

@@ -167,10 +167,21 @@ void eits_fast_look(const eits_fast *fast, const eits_real *place, eits_real rho
 {
     const uint32_t numbers = 2 * fast->model->n_electrodes;
     const eits_real per = 1 / disc->sum[0];
-    eits_zero(sight->field, numbers + 4);
-    for (uint32_t n = 0; n < disc->count; ++n)
-        fast_axpy(sight->field, per * disc->near[n].weight[0],
-                  fast_field(fast, disc->near[n].pixel), numbers + 4);
+    const eits_real *field[FAST_NEAR_MOST];
+    eits_real weight[FAST_NEAR_MOST];
+    for (uint32_t n = 0; n < disc->count; ++n) {
+        field[n] = fast_field(fast, disc->near[n].pixel);
+        weight[n] = per * disc->near[n].weight[0];
+    }
+    for (uint32_t e = 0; e < numbers + 4; e += 2) {
+        eits_real first = 0, second = 0;
+        for (uint32_t n = 0; n < disc->count; ++n) {
+            first = eits_fma(weight[n], field[n][e], first);
+            second = eits_fma(weight[n], field[n][e + 1], second);
+        }
+        sight->field[e] = first;
+        sight->field[e + 1] = second;
+    }
     eits_copy(sight->z, place, 2);
     sight->radius = eits_sqrt(rho2 / 2);
 }
