@@ -49,8 +49,9 @@ typedef struct fast_known {
     uint32_t frames_missed, confirmed;
     uint32_t aligned; /* it was there when a frame was last aligned, and where */
     eits_real at[2];
-    fast_last last; /* what the last frame said of it, and where it had it */
+    fast_last last; /* what the last solved frame said of it, where it had it, and when */
     eits_real place[2];
+    uint32_t place_us;
     eits_real anchor[2]; /* where it was `slow` drives ago */
     eits_real energy;    /* mean of what it explains of a drive's chi^2 */
     eits_real peak;      /* its greatest strength */

@@ -246,18 +246,21 @@ static void put(eits_fast *fast, uint32_t k, const eits_real *before, const eits
     fast_known *known = &fast->known[k];
     const eits_real by[2] = {place[0] - before[0], place[1] - before[1]};
     const eits_real far2 = by[0] * by[0] + by[1] * by[1];
-    const int moves = fast->frame_s > 0 && far2 > fast_square(EITS_FAST_PUT_MOVES_MM) &&
+    const eits_real took_s = fast_between_s(known->place_us, fast->aligned_us);
+    const int moves = took_s > 0 && far2 > fast_square(EITS_FAST_PUT_MOVES_MM) &&
                       far2 < fast_square(EITS_FAST_APART_MM);
-    eits_real now[2] = {place[0], place[1]};
-    for (uint32_t axis = 0; axis < 2 && moves; ++axis)
-        now[axis] += EITS_FAST_PUT_AHEAD * by[axis];
+    eits_real now[2] = {place[0], place[1]}, speed[2] = {0, 0};
+    for (uint32_t axis = 0; axis < 2 && moves; ++axis) {
+        speed[axis] = by[axis] / took_s;
+        now[axis] += EITS_FAST_PUT_AHEAD * fast->frame_s * speed[axis];
+    }
     set_by_frame(fast, k, eits_fast_on_skin(fast, now, known->rho2) ? now : place, c);
     if (!moves)
         return;
     const uint32_t at = FAST_SIZE * k;
     known->moving = 1;
     for (uint32_t axis = 0; axis < 2; ++axis) {
-        fast->state[at + FAST_VX + axis] = by[axis] / fast->frame_s;
+        fast->state[at + FAST_VX + axis] = speed[axis];
         fast->p[at + FAST_VX + axis][at + FAST_VX + axis] = fast_square(EITS_FAST_PUT_SPEED);
     }
 }
@@ -271,7 +274,8 @@ static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_re
     const fast_last before = known->last;
     const eits_real by = fast_distance2(place, known->place);
     const eits_real reach = fast->frame_explained ? EITS_FAST_AGREE_MM : EITS_FAST_APART_MM;
-    const int lost = known->moving && !fast->frame_explained && before == FAST_AGREED;
+    const int may_be_lost = known->moving || fast->unexplained_frames >= EITS_FAST_LOST_FRAMES;
+    const int lost = may_be_lost && !fast->frame_explained && before == FAST_AGREED;
     const int again = (before == FAST_ELSEWHERE || lost) && by < fast_square(reach);
     known->frames_missed = 0;
     known->last = fast_distance2(place, known->at) < fast_square(EITS_FAST_AGREE_MM)
@@ -282,6 +286,7 @@ static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_re
     else if (again && !(known->moving && fast->frame_explained))
         put(fast, k, known->place, place, c);
     eits_copy(known->place, place, 2);
+    known->place_us = fast->aligned_us;
 }
 
 eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t count)
