@@ -68,7 +68,7 @@
 
 /* that a drive with a search may spend [answers of a place in a drive]. larger: drives take longer;
  * smaller: searches do */
-#define EITS_FAST_ANSWERS 30
+#define EITS_FAST_ANSWERS 40
 
 /* fewer for each known touch, which take their own work [answers]. as FAST_ANSWERS */
 #define EITS_FAST_TOUCH_ANSWERS 3
