@@ -757,7 +757,7 @@ TEST(test_what_is_refused)
     memset(found, 0, sizeof found);
     CHECK_EQUAL(b->size,
                 EITS_FAST_SIZE(SMALL_ROWS, SMALL_ELECTRODES, 5, SMALL_ELECTRODES, SIDE, SIDE));
-    CHECK((uint8_t *)(b->fast->ring[EITS_FAST_RING - 1].known) +
+    CHECK((uint8_t *)(b->fast->ring[EITS_FAST_RING - 1]->known) +
               EITS_REALS(EITS_FAST_TOUCHES * FAST_WAYS * 5) <=
           memory + b->size); /* the last that is laid out */
     CHECK_EQUAL(eits_fast_size(NULL), 0);
