@@ -68,13 +68,13 @@
 
 /* that a drive with a search may spend [answers of a place in a drive]. larger: drives take longer;
  * smaller: searches do */
-#define EITS_FAST_ANSWERS 40
+#define EITS_FAST_ANSWERS 30
 
 /* fewer for each known touch, which take their own work [answers]. as FAST_ANSWERS */
 #define EITS_FAST_TOUCH_ANSWERS 3
 
 /* what the map of a drive costs [answers]. larger: fewer pieces of a search in a drive */
-#define EITS_FAST_MAP_ANSWERS 8
+#define EITS_FAST_MAP_ANSWERS 4
 
 /* that wait, the newest, of which the map is made [drives]. larger: more work; smaller: starts far
  * from the best place */
