@@ -801,13 +801,15 @@ TEST(test_what_is_refused)
     for (uint32_t i = 0; i < SMALL_ROWS; ++i)
         memcpy(table + 4 * i, table, 2);
     model->protocol = table;
-    CHECK_EQUAL(eits_fast_size(model), EITS_FAST_SIZE(SMALL_ROWS, 0, 0, SIDE, SIDE));
+    CHECK_EQUAL(eits_fast_size(model),
+                EITS_FAST_SIZE(SMALL_ROWS, 0, 0, SMALL_ELECTRODES, SIDE, SIDE));
     model->n_rows = EITS_FAST_ROWS; /* as many as a drive may have */
     CHECK_EQUAL(eits_fast_size(model),
                 EITS_FAST_SIZE(EITS_FAST_ROWS, 1, EITS_FAST_ROWS, SMALL_ELECTRODES, SIDE, SIDE));
     model->n_rows = SMALL_ROWS;
     model->fields.at.data = NULL; /* no drives */
-    CHECK_EQUAL(eits_fast_size(model), EITS_FAST_SIZE(SMALL_ROWS, 0, 0, SIDE, SIDE));
+    CHECK_EQUAL(eits_fast_size(model),
+                EITS_FAST_SIZE(SMALL_ROWS, 0, 0, SMALL_ELECTRODES, SIDE, SIDE));
     CHECK_EQUAL(eits_fast_size(NULL), 0);
     CHECK(made == NULL);
 }

@@ -33,7 +33,7 @@
  * touches lose a row */
 #define EITS_FAST_GLITCH R(60.0)
 
-/* the same while drives wait for an explanation. larger: glitches delay touches; smaller: drives of
+/* the same of known touches while drives wait. larger: glitches delay touches; smaller: drives of
  * touches that start to move are lost */
 #define EITS_FAST_GLITCH_WAITING R(3000.0)
 
