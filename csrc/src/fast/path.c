@@ -86,9 +86,9 @@ static int is_glitch(eits_fast *fast, uint32_t rows)
             worst = i;
         }
     }
-    /* While drives wait, a touch that lands or starts to move may change one row by far the most.
-     */
-    const eits_real least = fast->held_count > 0 ? EITS_FAST_GLITCH_WAITING : EITS_FAST_GLITCH;
+    /* While drives wait, a known touch that starts to move may change one row by far the most. */
+    const int waits = fast->held_count > 0 && fast->count > 0;
+    const eits_real least = waits ? EITS_FAST_GLITCH_WAITING : EITS_FAST_GLITCH;
     if (!(greatest > least) || fast->glitched)
         return 0;
     /* One row, and not twice on end: a second such drive is a faulty electrode or a touch beside
