@@ -105,9 +105,9 @@ static void new_state(const eits_fast *fast, const fast_trial *trial, uint32_t i
     body_covariance(all, first_number(trial, i), body->numbers, dt, doubt, covariance);
     covariance[FAST_C][FAST_C] = doubt * trial->variance[which];
     add_doubt(covariance, EITS_FAST_BORN_MM, EITS_FAST_BORN_STRENGTH * c,
-              moves                            ? EITS_FAST_BORN_SPEED
+              moves                          ? EITS_FAST_BORN_SPEED
               : may_move(fast, trial, which) ? EITS_FAST_FIRST_SPEED
-                                               : 0);
+                                             : 0);
     state[FAST_C] = c;
     for (uint32_t axis = 0; axis < 2; ++axis) {
         state[axis] = body->p[axis] + (moves ? dt * body->p[2 + axis] : 0);
