@@ -161,6 +161,12 @@ eits_status eits_fast_begin(eits_fast *fast)
     fast->timed = fast->unexplained = fast->unexplained_frames = fast->glitched = 0;
     eits_fast_empty_ring(fast);
     fast->search.warm_count = fast->search.pair_known = fast->search.last_count = 0;
+    /* Nothing of what came before: a recording that begins here gives the same bits. */
+    fast->search.decisions = fast->search.warm_at = fast->search.pair_at = 0;
+    fast->search.last_at = fast->search.last_times = 0;
+    fast->frame_s = 0;
+    for (uint32_t n = 0; n < EITS_FAST_RING; ++n)
+        fast->ring[n]->plain = 0;
     /* What frames named stays until the next is aligned: one may still be solved meanwhile. */
     fast->fresh = 1;
     fast->next_aligned = fast->next_id;
