@@ -105,19 +105,20 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     fast->aligned_us = fast->time_us;
     fast->stirred = fast->glitched || fast->next_id != fast->next_aligned;
     fast->next_aligned = fast->next_id;
-    for (uint32_t k = 0; k < fast->count; ++k) {
-        if (has_moved(fast, k, &fast->stirred))
-            align_touch(fast, k, aligned);
-        fast->stirred |= !fast->known[k].on;
-        fast->known[k].aligned = 1;
-        eits_copy(fast->known[k].at, fast->state + FAST_SIZE * k, 2);
-    }
     /* A frame with drives that nothing explains would be named faulty, or solved into touches that
      * are not there. After EITS_FAST_FRAMES such frames the fault is real, or a touch too slow to
      * be born; the solver decides. */
     int explained = fast->held_count == 0;
     for (uint32_t n = 0; n < fast->drives; ++n)
         explained &= fast->drive[n].explained;
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        /* Tracks that do not explain the drives cannot bring them to one instant. */
+        if (has_moved(fast, k, &fast->stirred) && explained)
+            align_touch(fast, k, aligned);
+        fast->stirred |= !fast->known[k].on;
+        fast->known[k].aligned = 1;
+        eits_copy(fast->known[k].at, fast->state + FAST_SIZE * k, 2);
+    }
     fast->frame_explained = (uint32_t)explained;
     fast->unexplained_frames = explained ? 0 : fast->unexplained_frames + 1;
     fast->stirred |= !explained;
@@ -125,9 +126,6 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     *state = explained ? (uint32_t)EITS_FAST_EXPLAINED : 0u;
     if (explained || fast->unexplained_frames > EITS_FAST_FRAMES)
         *state |= (uint32_t)EITS_FAST_TRUSTED;
-    /* tracks that do not explain the drives are not to be trusted to bring them to one instant */
-    if (!explained)
-        eits_copy(aligned, volts, length);
     fast->aligned = 1;
     return eits_fast_touches(fast, fast->followed, EITS_FAST_MAX_TOUCHES, &fast->n_followed);
 }
