@@ -22,7 +22,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { MAX_MODEL = 2048 * 1024, MAX_WORKSPACE = 1280 * 1024, MAX_ROWS = 4096, MAX_FAST = 96 * 1024 };
+enum { MAX_MODEL = 2048 * 1024, MAX_WORKSPACE = 1280 * 1024, MAX_ROWS = 4096, MAX_FAST = 65536 };
 
 static _Alignas(16) uint8_t model_bytes[MAX_MODEL];
 static _Alignas(16) uint8_t workspace[MAX_WORKSPACE];

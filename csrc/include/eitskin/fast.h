@@ -168,7 +168,7 @@ typedef struct eits_fast eits_fast;
 /* clang-format on */
 
 /* Bytes of its memory, a constant expression, for a model with `n_rows` rows in `drives` drives, of
- * which the longest has `drive_rows`, with `n_electrodes` and a grid of nx x ny pixels. It is 47 kB
+ * which the longest has `drive_rows`, with `n_electrodes` and a grid of nx x ny pixels. It is 56 kB
  * for 16 electrodes in float32. */
 #define EITS_FAST_SIZE(n_rows, drives, drive_rows, n_electrodes, nx, ny)              \
     (EITS_FAST_STATE +                                                                \
