@@ -52,10 +52,12 @@ def empty_bank() -> bytes:
     return bytes([ERASED]) * BANK_BYTES
 
 
-def sim_board(model: bytes | None = None, *, no_model: bool = False) -> SimBoard:
+def sim_board(
+    model: bytes | None = None, *, no_model: bool = False, elements: int = 2500
+) -> SimBoard:
     """A board with ``model`` (the prebuilt one) in bank 0."""
     first = empty_bank() if no_model else bank_bytes(model or prebuilt()[1], 1)
-    return SimBoard(frames(), [first, empty_bank()])
+    return SimBoard(frames(elements), [first, empty_bank()])
 
 
 def stats_of(board: SimBoard) -> BoardStats:
