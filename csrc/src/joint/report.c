@@ -196,15 +196,16 @@ static int any_may_be_one(const eits_context *ctx, const eits_joint *j,
 
 /* Whether the shapes need no test: nothing is left of the data, and the frame is far likelier with
  * each than without. Where `fewer` stand for more discs, less may be left: two that are one leave
- * little. */
+ * little. So where few have become more than the `begun`: two may make up for another that is
+ * wrong. */
 static int is_clear(const eits_context *ctx, const eits_joint *j, const eits_joint_known *known,
-                    uint32_t fewer)
+                    uint32_t fewer, uint32_t begun)
 {
     const eits_real excess = eits_joint_excess(ctx, j);
-    const eits_real fitted =
-        j->count < EITS_JOINT_CROWD ? EITS_JOINT_FITTED : EITS_JOINT_CROWD_FITTED;
-    if (!(excess < fitted) ||
-        (fewer > 0 && j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT))
+    const int few = j->count < EITS_JOINT_CROWD,
+              fewer_or_more = fewer > 0 || (few && j->count > begun);
+    if (!(excess < (few ? EITS_JOINT_FITTED : EITS_JOINT_CROWD_FITTED)) ||
+        (fewer_or_more && j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT))
         return 0;
     for (uint32_t k = 0; k < j->count; ++k) {
         /* one large light touch explains what two near ones do */
@@ -224,7 +225,7 @@ static int fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit 
     j->searches = 1;
     if (!f->settled)
         leave_out_weak(ctx, j);
-    const uint32_t fewer = eits_joint_merge(j);
+    const uint32_t fewer = eits_joint_merge(j), begun = j->count;
     int clear = 0;
     if (j->count > 0 && j->count * j->parameters <= EITS_JOINT_PARAMETERS) {
         if (fewer == 0)
@@ -232,7 +233,7 @@ static int fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit 
         f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, scratch, j);
         if (explains(ctx, j)) {
             f->macs += eits_joint_places(ctx, j, known);
-            clear = is_clear(ctx, j, known, fewer) && !any_may_be_one(ctx, j, known);
+            clear = is_clear(ctx, j, known, fewer, begun) && !any_may_be_one(ctx, j, known);
         }
         return clear;
     }
