@@ -32,8 +32,12 @@ SIZES = frozenset(
         "FAST_MAX_TOUCHES",
         "FAST_MAX_ROWS",
         "FAST_HELD",
-        "FAST_STARTS",
-        "FAST_PAIR_HELD",
+        "FAST_RING",
+        "FAST_SUM_DRIVES",
+        "FAST_MAP_DRIVES",
+        "FAST_ANSWERS",
+        "FAST_TOUCH_ANSWERS",
+        "FAST_SEARCHED",
         "SPLIT_DIRECTIONS",
     }
 )
