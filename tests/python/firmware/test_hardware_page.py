@@ -58,10 +58,13 @@ class Wire:
 
 
 def cells(first: str) -> list[list[str]]:
-    """The rows of the table whose head begins with ``first``, its head first."""
-    table = re.findall(rf"^\| {first} \|.*\n(?:\|.*\n)+", PAGE, re.MULTILINE)[0]
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
-    return [rows[0], *rows[2:]]
+    """The rows of all tables whose head begins with ``first``, the head first."""
+    found = []
+    for table in re.findall(rf"^\| {first} \|.*\n(?:\|.*\n)+", PAGE, re.MULTILINE):
+        lines = table.splitlines()
+        rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+        found += [*rows[2:]] if found else [rows[0], *rows[2:]]
+    return found
 
 
 def wires() -> list[Wire]:

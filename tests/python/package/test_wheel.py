@@ -11,7 +11,7 @@ from eitskin.config import load_toml
 
 ROOT = Path(__file__).resolve().parents[3]
 BUILT = {".so", ".pyd", ".dylib"}  # compiled in
-MAX_BYTES = 2_100_000
+MAX_BYTES = 2_250_000
 
 
 @pytest.fixture(scope="module")
