@@ -169,10 +169,13 @@ typedef struct eits_fast eits_fast;
 
 /* Bytes of its memory, a constant expression, for a model with `n_rows` rows in `drives` drives, of
  * which the longest has `drive_rows`, with `n_electrodes` and a grid of nx x ny pixels. It is 56 kB
- * for 16 electrodes in float32. */
-#define EITS_FAST_SIZE(n_rows, drives, drive_rows, n_electrodes, nx, ny)              \
-    (EITS_FAST_STATE +                                                                \
-     EITS_ALIGN16((size_t)(drives) * EITS_FAST_DRIVE)                                 \
+ * for 16 electrodes in float32. Without drives no array is needed. */
+#define EITS_FAST_SIZE(n_rows, drives, drive_rows, n_electrodes, nx, ny) \
+    (EITS_FAST_STATE +                                                   \
+     ((drives) == 0 ? (size_t)0                                          \
+                    : EITS_FAST_ARRAYS_SIZE(n_rows, drives, drive_rows, n_electrodes, nx, ny)))
+#define EITS_FAST_ARRAYS_SIZE(n_rows, drives, drive_rows, n_electrodes, nx, ny)       \
+    (EITS_ALIGN16((size_t)(drives) * EITS_FAST_DRIVE)                                 \
          EITS_FAST_ARRAYS(EITS_ADD_BYTES, n_rows, drive_rows, n_electrodes, nx, ny) + \
      EITS_FAST_TOUCHES * (0u EITS_FAST_TOUCH_ARRAYS(EITS_ADD_BYTES, n_electrodes)) +  \
      EITS_FAST_WAITING * (0u EITS_FAST_WAITING_ARRAYS(EITS_ADD_BYTES, drive_rows)))

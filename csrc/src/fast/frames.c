@@ -161,7 +161,7 @@ static void match(const eits_fast *fast, const eits_real (*found)[2], uint32_t c
 static void mask_named(eits_fast *fast)
 {
     const uint8_t *states = fast->ctx->rows.electrode;
-    for (uint32_t i = 0; i < fast->model->n_rows; ++i) {
+    for (uint32_t i = 0; i < fast->model->n_rows && fast->drives > 0; ++i) {
         const uint8_t *row = eits_row(fast->ctx, i);
         fast->masked[i] = (states[row[0]] | states[row[1]] | states[row[2]] | states[row[3]]) != 0;
     }

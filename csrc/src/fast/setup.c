@@ -64,13 +64,16 @@ static void *take(uint8_t **next, size_t bytes)
 
 static void lay_out(uint8_t *next, const eits_model *model, shape s, eits_fast *fast)
 {
+    for (uint32_t n = 0; n < EITS_FAST_RING; ++n)
+        fast->ring[n] = &fast->held[n];
+    if (s.drives == 0)
+        return;
     fast->drive = take(&next, s.drives * sizeof *fast->drive);
     EITS_FAST_ARRAYS(TAKE, model->n_rows, s.most_rows, model->n_electrodes, model->nx, model->ny)
     for (fast_sight *sight = fast->sight; sight < fast->sight + EITS_FAST_MAX_TOUCHES; ++sight) {
         EITS_FAST_TOUCH_ARRAYS(TAKE_TOUCH, model->n_electrodes)
     }
     for (fast_held *held = fast->held; held < fast->held + EITS_FAST_RING; ++held) {
-        fast->ring[held - fast->held] = held;
         EITS_FAST_WAITING_ARRAYS(TAKE_WAITING, s.most_rows)
     }
 }
@@ -89,7 +92,9 @@ static void list(eits_fast *fast)
 {
     const eits_model *model = fast->model;
     uint32_t row = 0;
-    for (uint32_t i = 0; i < model->n_rows && fast->most_rows > 0; ++i) {
+    if (fast->most_rows == 0)
+        return;
+    for (uint32_t i = 0; i < model->n_rows; ++i) {
         uint32_t before, after;
         count_rows(model, i, &before, &after);
         if (before > 0)
@@ -142,7 +147,7 @@ eits_status eits_fast_begin(eits_fast *fast)
     /* Without noise every residual would be news, and chi-squares infinite. */
     if (!reference->ready || !(reference->noise_v > 0))
         return EITS_E_NO_REFERENCE;
-    const uint32_t rows = fast->model->n_rows;
+    const uint32_t rows = fast->drives > 0 ? fast->model->n_rows : 0;
     eits_real energy = 0;
     /* Copied once: after a tare the caller begins again, so that a touch is never seen by two sets
      * of gains. */
@@ -152,7 +157,7 @@ eits_status eits_fast_begin(eits_fast *fast)
         energy += fast->gain[i] * fast->gain[i];
     }
     fast->noise_v = reference->noise_v;
-    fast->sigma = reference->noise_v * eits_sqrt(energy / (eits_real)rows);
+    fast->sigma = rows > 0 ? reference->noise_v * eits_sqrt(energy / (eits_real)rows) : 0;
     fast->sign = fast->ctx->options.sign == EITS_SIGN_DECREASE ? R(-1) : R(1);
     fast->drift = 0;
     fast->wild = 0;

@@ -62,7 +62,6 @@ def board(image, tmp_path_factory):
     return device, blob
 
 
-@pytest.mark.xfail(reason="the twin's bits differ since touches come from hypotheses", strict=False)
 def test_32_electrodes_are_scanned_and_solved_with_the_hosts_bits(board):
     device, blob = board
     info = device.board
