@@ -192,6 +192,25 @@ int eits_joint_near(const eits_shape *a, const eits_shape *b, eits_real radii);
 
 /* report.c */
 
+/* The part of the data's energy that the shapes leave beyond noise and the model's errors. */
+eits_real eits_joint_left(const eits_context *ctx, const eits_joint *j);
+
+/* Whether the shapes explain the frame. */
+int eits_joint_explains(const eits_context *ctx, const eits_joint *j);
+
+/* If the shapes need no test, they become the frame's touches, as sure as F says, and 1 is
+ * returned. They were `begun` shapes, which stand for `fewer` more discs. */
+int eits_joint_take_if_clear(eits_context *ctx, const eits_joint *j, uint32_t fewer, uint32_t begun,
+                             eits_fit *f);
+
+/* The same without that condition. */
+void eits_joint_take(eits_context *ctx, const eits_joint *j, eits_fit *f);
+
+/* The shapes give the touches that the test left their places and sizes. */
+void eits_joint_refine(eits_context *ctx, const eits_joint *j, eits_fit *f);
+
+/* begin.c */
+
 /* Whether frames are fitted jointly: the option is on, the model has what that takes, and the
  * reference is of a skin that the model describes. */
 int eits_can_fit_jointly(const eits_context *ctx);

@@ -1,61 +1,10 @@
-/* From fitted discs to the joint fit and back. */
+/* From the joint fit's shapes to the frame's touches, and whether they need a test. */
 #include "joint/joint.h"
 
 #include "base/vec.h"
 #include "context/places.h"
 #include "joint/constants.h"
 #include "kernels/kernels.h"
-
-/* A disc as a touch that is not light. */
-static eits_shape shape_of(const eits_context *ctx, const eits_disc *d)
-{
-    const eits_model *model = ctx->model;
-    const eits_real pixel = (eits_real)model->pixel_mm;
-    const eits_shape found = {.x = (d->x_mm - (eits_real)model->origin_x_mm) / pixel,
-                              .y = (d->y_mm - (eits_real)model->origin_y_mm) / pixel,
-                              .radius = d->radius_mm / pixel,
-                              .amplitude = d->change / eits_pole_sheet(model)};
-    return eits_joint_as_strong(&found);
-}
-
-/* The fit's discs as shapes, each of the strength that was found. */
-static eits_joint begin(const eits_context *ctx, const eits_fit *f)
-{
-    eits_joint j = {.count = f->count, .parameters = EITS_JOINT_DISC, .searches = 0};
-    for (uint32_t k = 0; k < f->count; ++k) {
-        j.from[k] = k;
-        j.shape[k] = shape_of(ctx, &f->disc[k]);
-    }
-    return j;
-}
-
-/* Whether a shape's middle is away from the rim. */
-static int is_inside(const eits_context *ctx, const eits_shape *s)
-{
-    const eits_real r = EITS_JOINT_RIM;
-    return eits_pole_on_skin(ctx, s->x - r, s->y) && eits_pole_on_skin(ctx, s->x + r, s->y) &&
-           eits_pole_on_skin(ctx, s->x, s->y - r) && eits_pole_on_skin(ctx, s->x, s->y + r);
-}
-
-/* Leave out weak peaks, which the image often shows beside touches, above all at the rim. If the
- * others explain the frame, these were none. */
-static void leave_out_weak(const eits_context *ctx, eits_joint *j)
-{
-    eits_real greatest = 0;
-    uint32_t count = 0;
-    for (uint32_t k = 0; k < j->count; ++k) {
-        greatest = eits_larger(greatest, eits_fabs(eits_joint_strength(&j->shape[k])));
-    }
-    for (uint32_t k = 0; k < j->count; ++k) {
-        const eits_shape *s = &j->shape[k];
-        const eits_real least = is_inside(ctx, s) ? EITS_JOINT_WEAK : EITS_JOINT_WEAK_AT_RIM;
-        if (eits_fabs(eits_joint_strength(s)) < least * greatest)
-            continue;
-        j->from[count] = j->from[k];
-        j->shape[count++] = *s;
-    }
-    j->count = count;
-}
 
 static int all_finite(const eits_joint *j)
 {
@@ -89,9 +38,7 @@ static void inherit(eits_fit *f, uint32_t of, uint32_t k)
     f->confidence[k] = f->confidence[of];
 }
 
-/* Return the part of the data's energy that the shapes leave beyond noise and the model's errors.
- */
-static eits_real left_beyond_noise(const eits_context *ctx, const eits_joint *j)
+eits_real eits_joint_left(const eits_context *ctx, const eits_joint *j)
 {
     return eits_larger(j->misfit - eits_joint_freedom(ctx, j), 0);
 }
@@ -136,7 +83,7 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
     const eits_real pixel = (eits_real)model->pixel_mm, sheet = eits_pole_sheet(model),
                     excess = eits_joint_excess(ctx, j), whole = eits_joint_data(ctx);
     ctx->info.unexplained = whole > 0 && j->left > 0 ? j->left / whole : 0;
-    f->beyond_noise = whole > 0 ? left_beyond_noise(ctx, j) / whole : 0;
+    f->beyond_noise = whole > 0 ? eits_joint_left(ctx, j) / whole : 0;
     f->count = j->count;
     f->joint = 1;
     for (uint32_t k = 0; k < j->count; ++k) {
@@ -158,23 +105,9 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
     }
 }
 
-int eits_can_fit_jointly(const eits_context *ctx)
+int eits_joint_explains(const eits_context *ctx, const eits_joint *j)
 {
-    return ctx->options.touch_test && !ctx->reference.far && eits_may_fit_jointly(ctx) &&
-           ctx->model->uncertainty.errors != NULL;
-}
-
-/* Whether these touches are few enough, and the frame is one that the joint fit takes. */
-static int may_fit(const eits_context *ctx, const eits_fit *f)
-{
-    return f->count > 0 && f->count * EITS_JOINT_DISC <= EITS_JOINT_PARAMETERS &&
-           eits_can_fit_jointly(ctx);
-}
-
-/* Whether the shapes explain the frame. */
-static int explains(const eits_context *ctx, const eits_joint *j)
-{
-    return all_finite(j) && left_beyond_noise(ctx, j) < EITS_JOINT_MAX_LEFT * eits_joint_data(ctx);
+    return all_finite(j) && eits_joint_left(ctx, j) < EITS_JOINT_MAX_LEFT * eits_joint_data(ctx);
 }
 
 /* Whether any two shapes may be one: they are near, were not found better than one (split.c), and
@@ -216,54 +149,6 @@ static int is_clear(const eits_context *ctx, const eits_joint *j, const eits_joi
     return 1;
 }
 
-/* Fit the discs of `f` jointly, in *j, those that may be parts of one as one. Returns whether that
- * needs no test; else j->count is 0 unless *j has the discs as they are, settled. */
-static int fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j,
-                       eits_joint_known *known)
-{
-    *j = begin(ctx, f);
-    j->searches = 1;
-    if (!f->settled)
-        leave_out_weak(ctx, j);
-    const uint32_t fewer = eits_joint_merge(j), begun = j->count;
-    int clear = 0;
-    if (j->count > 0 && j->count * j->parameters <= EITS_JOINT_PARAMETERS) {
-        if (fewer == 0)
-            eits_joint_guess_kinds(ctx, j);
-        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, scratch, j);
-        if (explains(ctx, j)) {
-            f->macs += eits_joint_places(ctx, j, known);
-            clear = is_clear(ctx, j, known, fewer, begun) && !any_may_be_one(ctx, j, known);
-        }
-        return clear;
-    }
-    j->count = 0;
-    return 0;
-}
-
-int eits_joint_is_likely(const eits_context *ctx, const eits_joint *j)
-{
-    return j->count > 0 && explains(ctx, j) && eits_joint_excess(ctx, j) < EITS_JOINT_LIKELY;
-}
-
-void eits_joint_give(const eits_context *ctx, const eits_joint *j, eits_fit *f)
-{
-    const eits_model *model = ctx->model;
-    const eits_real pixel = (eits_real)model->pixel_mm, sheet = eits_pole_sheet(model);
-    f->count = j->count;
-    for (uint32_t k = 0; k < j->count; ++k) {
-        const eits_shape *s = &j->shape[k];
-        f->disc[k] = (eits_disc){
-            .x_mm = eits_fma(s->x, pixel, (eits_real)model->origin_x_mm),
-            .y_mm = eits_fma(s->y, pixel, (eits_real)model->origin_y_mm),
-            .radius_mm = eits_clamp(s->radius * pixel, ctx->options.touch_min_radius_mm,
-                                    ctx->options.touch_max_radius_mm),
-            .change = sheet * s->amplitude,
-            .polarity = s->amplitude < 0 ? R(-1) : R(1),
-        };
-    }
-}
-
 /* The shapes become the frame's touches, as sure as F says. */
 static void take(eits_context *ctx, const eits_joint *j, const eits_joint_known *known, eits_fit *f)
 {
@@ -277,64 +162,28 @@ static void take(eits_context *ctx, const eits_joint *j, const eits_joint_known 
     }
 }
 
-int eits_fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j)
+int eits_joint_take_if_clear(eits_context *ctx, const eits_joint *j, uint32_t fewer, uint32_t begun,
+                             eits_fit *f)
 {
     eits_joint_known known[EITS_MAX_TOUCHES];
-    j->count = 0;
-    ctx->joint.spent = 0;
-    eits_pole_forget(ctx);
-    if (!may_fit(ctx, f) || !fit_clearly(ctx, scratch, f, j, known))
+    f->macs += eits_joint_places(ctx, j, known);
+    if (!is_clear(ctx, j, known, fewer, begun) || any_may_be_one(ctx, j, known))
         return 0;
     take(ctx, j, known, f);
     return 1;
 }
 
-/* Whether *j has a shape at each of the fit's discs. */
-static int same_touches(const eits_context *ctx, const eits_fit *f, const eits_joint *j)
-{
-    int same = f->count == j->count;
-    for (uint32_t k = 0; k < f->count && same; ++k) {
-        const eits_shape s = shape_of(ctx, &f->disc[k]);
-        uint32_t near = 0;
-        for (uint32_t i = 0; i < j->count; ++i)
-            near += (uint32_t)eits_joint_near(&s, &j->shape[i], EITS_JOINT_SAME);
-        same = near == 1;
-    }
-    return same;
-}
-
-/* Whether the fit before the test explains the frame far better than that of what the test left:
- * near the rim the discs of the test are a poor model, and it drops touches or adds some. */
-static int was_better(const eits_context *ctx, const eits_joint *first, const eits_joint *j)
-{
-    return !explains(ctx, j) && first->count > 0 && explains(ctx, first) &&
-           left_beyond_noise(ctx, first) < EITS_JOINT_SURE * eits_joint_data(ctx);
-}
-
-void eits_fit_jointly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j)
+void eits_joint_take(eits_context *ctx, const eits_joint *j, eits_fit *f)
 {
     eits_joint_known known[EITS_MAX_TOUCHES];
-    const eits_joint first = *j;
-    if (!f->tested || !may_fit(ctx, f))
-        return;
-    if (!same_touches(ctx, f, j)) {
-        *j = begin(ctx, f);
-        eits_joint_guess_kinds(ctx, j);
-        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, scratch, j);
-    }
-    const int back = was_better(ctx, &first, j);
-    if (back) {
-        *j = first;
-        f->macs += eits_joint_return_to(ctx, j);
-    } else if (!explains(ctx, j) || (f->drifts && eits_joint_excess(ctx, j) > EITS_JOINT_FITTED))
-        return;
-    else
-        f->macs += eits_joint_evaluate(ctx, j, 1);
     f->macs += eits_joint_places(ctx, j, known);
-    if (back) {
-        take(ctx, j, known, f);
-        return;
-    }
+    take(ctx, j, known, f);
+}
+
+void eits_joint_refine(eits_context *ctx, const eits_joint *j, eits_fit *f)
+{
+    eits_joint_known known[EITS_MAX_TOUCHES];
+    f->macs += eits_joint_places(ctx, j, known);
     for (uint32_t k = f->count; k < j->count; ++k) /* parts of what was split */
         inherit(f, j->from[k], k);
     report(ctx, j, known, f);
