@@ -1,4 +1,4 @@
-/* What the known touches should give a drive's rows, and by how much the model is wrong there.
+/* This file predicts a drive's rows from the known touches, and learns the model's error there.
  *
  * A still touch leaves more than noise, the same in each scan: the model's error. It is learned row
  * by row while all is quiet, and serves as far as the touches still give what they gave then: its
@@ -132,7 +132,7 @@ void eits_fast_learn(eits_fast *fast, uint32_t drive, const eits_real *strength)
     const size_t size = FAST_WAYS * (size_t)fast->most_rows;
     eits_real *left = fast->spare;
     d->learned = 1;
-    /* What an update leaves of the rows is R S^-1 e. */
+    /* An update leaves R S^-1 e of the rows. */
     eits_copy(left, fast->white, d->count);
     for (uint32_t i = d->count; i-- > 0;) {
         const eits_real *line = fast_line(fast->factor, i);

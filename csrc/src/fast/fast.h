@@ -30,15 +30,14 @@ typedef struct fast_drive {
     eits_real then[EITS_FAST_MAX_TOUCHES][FAST_WAYS];
 } fast_drive;
 
-/* What a place sees: the mean over its disc of each electrode's field (x of each, then y) and of
- * the mirror's four numbers; two such places are enough for what two touches do to each other. */
+/* The fields at a place: the mean over its disc of each electrode's field (x of each, then y) and
+ * of the mirror's four numbers. Two such places give what two touches do to each other. */
 typedef struct fast_sight {
     eits_real *field;
     eits_real z[2], radius;
 } fast_sight;
 
-/* What the last frame said of a touch: it did not show it, near where drives had it, or elsewhere.
- */
+/* The last frame did not show a touch, showed it where drives had it, or showed it elsewhere. */
 typedef enum fast_last { FAST_NOT_SEEN, FAST_AGREED, FAST_ELSEWHERE } fast_last;
 
 /* A touch beside its state. */
@@ -213,7 +212,7 @@ static inline void fast_whiten(eits_real *factor, eits_real *v, uint32_t count)
     }
 }
 
-/* Of two places, squared. */
+/* Return the squared distance of two places. */
 static inline eits_real fast_distance2(const eits_real *a, const eits_real *b)
 {
     const eits_real dx = a[0] - b[0], dy = a[1] - b[1];
@@ -232,7 +231,7 @@ static inline eits_real fast_between_s(uint32_t from_us, uint32_t to_us)
     return (eits_real)(int32_t)(to_us - from_us) * R(1e-6);
 }
 
-/* How far from touch k another may be born: the more, the wider k is. */
+/* Return the least distance from touch k at which another may be born. It grows with k's width. */
 static inline eits_real fast_room_mm(const eits_fast *fast, uint32_t k)
 {
     return EITS_FAST_APART_MM +
@@ -266,8 +265,8 @@ void eits_fast_expect(eits_fast *fast, uint32_t drive);
 /* News that was left of the same rows one scan before is the model's error, not a touch's: it is
  * learned. 1 where it is. */
 int eits_fast_is_known_error(eits_fast *fast, uint32_t drive, eits_real chi2);
-/* What the update has left of the rows is the model's error: `strength` are the strengths before
- * it. */
+/* Learn the model's error from what the update has left of the rows; `strength` are the strengths
+ * before the update. */
 void eits_fast_learn(eits_fast *fast, uint32_t drive, const eits_real *strength);
 void eits_fast_forget_errors(eits_fast *fast, uint32_t drive);
 
@@ -305,7 +304,8 @@ int eits_fast_peak(const eits_fast *fast, const eits_real *score, const eits_rea
 
 /* ---- ring.c ---- */
 
-/* The drive at hand enters the ring; it waits if it is news or others do. */
+/* Put the present drive into the ring. It waits for an explanation if it is news or if others wait.
+ */
 void eits_fast_keep(eits_fast *fast, uint32_t drive, uint32_t rows, int news);
 /* A new touch's answer and its slopes, whitened as the drive is. */
 void eits_fast_whiten_ways(const fast_held *held, uint32_t stride, uint32_t rows,

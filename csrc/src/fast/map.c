@@ -41,7 +41,7 @@ static void whiten_back(eits_real *factor, eits_real *u, uint32_t rows)
     }
 }
 
-/* What is the same for all cells. `beside`: a touch's whitened answer, NULL for none. */
+/* Prepare what all cells share. `beside` is a touch's whitened answer, or NULL. */
 static void look_at(eits_fast *fast, const fast_held *held, const eits_real *beside, sight *s)
 {
     const fast_drive *d = &fast->drive[held->drive];

@@ -131,7 +131,7 @@ static int is_drift(eits_fast *fast, uint32_t rows)
     return 1;
 }
 
-/* What moving one of the touches that are on promises of chi^2, the most of them. */
+/* Return by how much chi^2 would fall, as linearised, if the one touch moved that promises most. */
 static eits_real promise_of_moves(eits_fast *fast, uint32_t rows)
 {
     eits_real most = 0, *x = fast->spare, *y = fast->other_factor;
@@ -164,10 +164,9 @@ static int is_explained(eits_fast *fast, uint32_t rows, eits_real chi2)
     return chi2 < EITS_FAST_NEWS && promise_of_moves(fast, rows) < EITS_FAST_MOVES;
 }
 
-/* Where known strengths may have changed at once, which is allowed in two steps; chi^2 as it is
- * then, and whether that explains the rows. Where that does not explain the rows either, the
- * touches stay as sure as they were. Places are never loosened: a known touch would go to meet one
- * that lands. */
+/* Let known strengths change at once, in two steps. *chi2 becomes what is left then; return whether
+ * that explains the rows. If it does not, the touches stay as sure as they were. Places are never
+ * loosened, because a known touch would move towards one that lands. */
 static int with_changes(eits_fast *fast, uint32_t rows, eits_real *chi2)
 {
     const eits_real strength[2] = {EITS_FAST_STRENGTH_JUMP, EITS_FAST_CHANGE};

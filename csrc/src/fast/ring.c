@@ -109,7 +109,7 @@ void eits_fast_keep(eits_fast *fast, uint32_t drive, uint32_t rows, int news)
     eits_fast_whiten_held(fast, held);
     if (begins)
         eits_zero(fast->score, fast->cells);
-    /* It may have been measured while a touch landed, and then tells of a wrong place. */
+    /* A touch may have landed while the drive was measured; the drive then shows a wrong place. */
     held->mapped = begins && held->chi2 > EITS_FAST_SUDDEN;
 }
 

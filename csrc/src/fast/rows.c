@@ -139,8 +139,8 @@ int eits_fast_on_skin(const eits_fast *fast, const eits_real *place, eits_real r
     return 0;
 }
 
-/* What two touches do to each other's rows, to second order (csrc/src/touch/interaction.c has the
- * physics): each is a dipole in the drive's field, with a mirror in the rim, and bends the field at
+/* The interaction of two touches in the rows, to second order (csrc/src/touch/interaction.c has the
+ * physics). Each is a dipole in the drive's field, with a mirror in the rim, and bends the field at
  * the other. Fields are means over the touches' soft discs. */
 
 typedef struct complex_number {

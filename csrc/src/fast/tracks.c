@@ -64,7 +64,7 @@ static void factor_row(eits_fast *fast, uint32_t i, eits_real diagonal)
     fast_line(fast->factor, i)[i] = eits_sqrt(pivot > 0 ? pivot : fast_square(fast->sigma));
 }
 
-/* Where no touch is known, the noise alone: the triangle is a diagonal. */
+/* Without a known touch, the rows hold noise alone, and the triangle is a diagonal. */
 static eits_real innovate_alone(eits_fast *fast, uint32_t rows)
 {
     eits_zero(fast->factor, (size_t)rows * (rows + 1) / 2);

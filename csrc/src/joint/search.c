@@ -140,7 +140,7 @@ static int try_more(eits_context *ctx, const eits_scratch *scratch, eits_joint *
     return 1;
 }
 
-/* Which shape F rises least without. */
+/* Return the shape that F needs least: without it F rises by less than without any other. */
 static uint32_t weakest(const eits_joint *j, const eits_joint_known *known)
 {
     uint32_t of = 0;

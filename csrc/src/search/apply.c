@@ -1,5 +1,5 @@
-/* What becomes of the known touches when a hypothesis is acted on. It holds for the last drive of
- * its search; drives may have come since. */
+/* Acting on a hypothesis changes the known touches. The hypothesis holds for the last drive of its
+ * search; drives may have come since. */
 #include "search/search.h"
 
 /* All drives of the trial, and those since, are explained, and wait no more. */

@@ -9,8 +9,8 @@ static int one_is_not_enough(const eits_fast *fast)
            !eits_search_changed(fast, FAST_REPLACE);
 }
 
-/* What is looked for beside one new touch takes turns: two of them, or anything else; again what
- * the last search would have acted on. */
+/* Decisions take turns in what they look for beside one new touch: two of them, or anything else.
+ * What the last search would have acted on is looked for again. */
 static int odd(const eits_fast *fast)
 {
     const fast_search *s = &fast->search;
@@ -373,7 +373,7 @@ static uint32_t cost_of_alone(const eits_fast *fast)
     return both->exists ? both->count : 0;
 }
 
-/* What the moves alone leave of the same drives. */
+/* Fit the moves alone to the same drives, for comparison. */
 static void look_alone(eits_fast *fast)
 {
     fast_trial *alone = &fast->search.scratch;

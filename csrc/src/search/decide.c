@@ -1,7 +1,7 @@
-/* Which hypothesis is acted on. Costs are in chi^2: what is left, and what each number that was
- * free is worth. A wrong touch is worse than a late one, so that a birth must beat each move and
- * change of known touches by a margin, explain the drives to noise, leave no rival, and come out
- * twice; whatever is not clear waits for more drives. */
+/* This file decides which hypothesis is acted on. A cost is in chi^2: what the hypothesis leaves,
+ * and a price for each number that was free. A wrong touch is worse than a late one, so that a
+ * birth must beat each move and change of known touches by a margin, explain the drives to noise,
+ * leave no rival, and come out twice; whatever is not clear waits for more drives. */
 #include "search/search.h"
 
 static const eits_real HUGE_COST = R(1e30);
@@ -71,7 +71,7 @@ static void cost_births(eits_fast *fast)
                             4 * (eits_real)fast->count;
 }
 
-/* What a birth beside moves must save of what the moves alone leave of the same drives. */
+/* Whether a birth beside moves leaves enough less of the drives than the moves alone. */
 static int beats_its_moves(const eits_fast *fast, const fast_trial *both)
 {
     const eits_real share = EITS_FAST_BIRTH_SHARE * (both->all - both->left);

@@ -106,8 +106,8 @@ eits_real eits_doubt(const eits_fast *fast, const fast_trial *trial)
     return each > 1 ? each : 1;
 }
 
-/* What noise alone leaves, and hardly more (its mean is the freedom, its variance twice that); and
- * a part of what is explained, which a touch leaves that is no disc. */
+/* Whether the trial leaves hardly more than noise does, whose mean is the freedom and whose
+ * variance is twice that. A touch that is no disc may also leave `part` of what it explains. */
 static int leaves_noise(const eits_fast *fast, const fast_trial *trial, uint32_t fresh,
                         eits_real part)
 {

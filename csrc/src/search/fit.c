@@ -61,7 +61,7 @@ void eits_trial_answer(eits_fast *fast, const fast_held *held, const fast_disc *
     eits_fast_whiten_ways(held, fast->most_rows, rows, out);
 }
 
-/* Where body i is at a drive: dt after its trial's instant. */
+/* Find the place of body i at a drive, dt after its trial's instant. */
 static eits_real place_at(const eits_fast *fast, const fast_trial *trial, const fast_held *held,
                           uint32_t i, eits_real *place)
 {
@@ -109,7 +109,7 @@ static void solve_strengths(const eits_real *const *g, uint32_t count, const eit
     }
 }
 
-/* What is at hand of one drive. */
+/* One drive while a hypothesis is fitted to it. */
 typedef struct at_hand {
     const fast_held *held;
     uint32_t rows, columns;
@@ -228,7 +228,7 @@ static uint32_t make_basis(fast_trial *trial, const at_hand *at, const eits_real
     return basis;
 }
 
-/* What moving the bodies does to the rows, less what new strengths can do of it. */
+/* Make the columns that a move of the bodies adds to the rows, less what new strengths can add. */
 static void make_columns(eits_fast *fast, fast_trial *trial, at_hand *at, const eits_real *strength)
 {
     eits_real *unit[FAST_NEW];
@@ -262,7 +262,7 @@ static void add_equations(const eits_fast *fast, fast_trial *trial, const at_han
     }
 }
 
-/* What is left says that known strengths did change at once, which they seldom do. */
+/* Return the cost of known strengths that seem to have changed at once, which they seldom do. */
 static eits_real cost_of_change(const eits_fast *fast, const fast_trial *trial, const at_hand *at)
 {
     eits_real cost = 0;

@@ -1,5 +1,5 @@
-/* What becomes of drives that no known touch explains: hypotheses are fitted to those that wait,
- * and one is acted on when it beats the others by a margin (decide.c).
+/* Drives that no known touch explains wait. Hypotheses are fitted to them, and one is acted on when
+ * it beats the others by a margin (decide.c).
  *
  * A search has a fixed set of drives and a list of pieces of work (list.c). A piece looks at one
  * hypothesis, and may ask for steps that make it better. A drive does looks and steps as long as
@@ -60,8 +60,8 @@ extern const search_piece eits_piece_move, eits_piece_one, eits_piece_rival, eit
 extern const search_piece eits_pieces_change[4], eits_pieces_birth[10];
 /* The known touch that the best new one may be instead; 0: none is near. */
 int eits_search_near(const eits_fast *fast, uint32_t *k);
-/* Where the work is limited: a change of known touches leaves noise, and costs clearly less than a
- * birth; no other birth is then looked for. */
+/* Whether a change of known touches leaves only noise and costs clearly less than a birth. No other
+ * birth is looked for then, which saves work. */
 int eits_search_changed(const eits_fast *fast, fast_which which);
 
 /* The move alone is clear: no other change needs to be looked for. */
@@ -93,7 +93,7 @@ uint32_t eits_trial_numbers(const fast_trial *trial);
 /* The step that the normal equations ask for, at most EITS_FAST_MAX_STEP_MM for a place; its
  * length in places, or below 0 where they are singular. */
 eits_real eits_trial_step(const fast_trial *trial, eits_real shorter, eits_real *step);
-/* What the normal equations promise: b'h^-1 b, 0 where they are singular. */
+/* Return the fall of chi^2 that the normal equations promise, b'h^-1 b; 0 if they are singular. */
 eits_real eits_trial_promise(const fast_trial *trial);
 /* The inverse of the normal equations; 0 where they are singular. */
 int eits_trial_covariance(const fast_trial *trial, eits_real covariance[FAST_FIT][FAST_FIT]);
@@ -103,7 +103,7 @@ int eits_trial_covariance(const fast_trial *trial, eits_real covariance[FAST_FIT
 int eits_is_noise(const eits_fast *fast, const fast_trial *trial, uint32_t fresh);
 /* The same by a narrower bound: nothing else needs to be looked for. */
 int eits_is_clear(const eits_fast *fast, const fast_trial *trial, uint32_t fresh);
-/* What a birth costs, in chi^2. */
+/* Return the price of a birth, in chi^2. */
 eits_real eits_cost_of_birth(const fast_trial *trial);
 /* Act on the best hypothesis, or wait; 1 where one was acted on. */
 int eits_decide(eits_fast *fast);
@@ -113,8 +113,8 @@ int eits_decide(eits_fast *fast);
 void eits_apply_move(eits_fast *fast, const fast_trial *trial);
 void eits_apply_replace(eits_fast *fast, const fast_trial *trial);
 void eits_apply_birth(eits_fast *fast, const fast_trial *trial);
-/* What is left of chi^2 for each degree of freedom, at least 1: all that a fit says is doubted in
- * that proportion. */
+/* Return what is left of chi^2 for each degree of freedom, at least 1. The variances of a fit, and
+ * the gain that a birth needs, are multiplied by it. */
 eits_real eits_doubt(const eits_fast *fast, const fast_trial *trial);
 
 #endif

@@ -85,7 +85,7 @@ typedef struct fast_search {
     eits_real before; /* what the one new touch left before its last steps */
     eits_real alone;  /* what moves leave without the new touch beside them; below 0: not known */
     fast_disc disc[FAST_BODIES];
-    /* of a drive at hand: answers of bodies, what their numbers move of it; fields at bodies */
+    /* for the present drive: answers of bodies, how their numbers change it; fields at bodies */
     eits_real *ways, *column, *fields, *rest;
     eits_real *pair_score; /* by cell: what a second touch there would explain beside a first */
     eits_real peak[2];     /* of the map */
