@@ -17,7 +17,7 @@ def test_every_effect_has_a_picture():
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param("background", marks=pytest.mark.long("two other effects")), "phase", "bridged"],
+    [pytest.param("background", marks=pytest.mark.long("two other effects")), "phase", "flex"],
 )
 def test_pictures_are_drawn_small_and_the_same_again(name, tmp_path):
     for run in ("first", "second"):

@@ -16,9 +16,8 @@ from eitskin.arrays import AnyArray, FloatArray, IntArray
 from eitskin.config import from_table
 from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
-from eitskin.fem.mesh import lifted
 from eitskin.scene.cover import NO_CHANGE, Change, Cover
-from eitskin.scene.deformation import FLAT, Deformation, Flexed, one_after_another
+from eitskin.scene.deformation import FLAT, Deformation, one_after_another
 from eitskin.scene.description import Scene
 from eitskin.scene.effect import (
     Contacts,
@@ -55,7 +54,7 @@ class State:
     change: Change
     contacts: Contacts
     frame: int
-    deformation: Deformation | Flexed = FLAT
+    deformation: Deformation = FLAT
 
 
 class States:
@@ -67,8 +66,8 @@ class States:
         self._varying = [s for s in steps if isinstance(s, MaterialStep) and s.varies]
         self._deforming = [s for s in steps if isinstance(s, DeformationStep)]
         self._contacts = _contacts(scene, steps, frames)
-        self._changes: dict[tuple[tuple[TrueTouch, ...], Deformation | Flexed], Change] = {}
-        self._flexed: tuple[Flexed, Cover] | None = None
+        self._changes: dict[tuple[tuple[TrueTouch, ...], Deformation], Change] = {}
+        self._covered_as: tuple[Deformation, Cover] = FLAT, cover  # the last, since one may be slow
         self._number: dict[Any, int] = {}
         self.all: list[State] = []
         self.motion = Motion(scene.touches, size_to_paper(scene.skin.outline))
@@ -96,9 +95,7 @@ class States:
         touches = state.touches + fingers
         return replace(state, touches=touches, change=self._covered(touches, state.deformation))
 
-    def change(
-        self, touches: tuple[TrueTouch, ...], deformation: Deformation | Flexed = FLAT
-    ) -> Change:
+    def change(self, touches: tuple[TrueTouch, ...], deformation: Deformation = FLAT) -> Change:
         """Return how ``touches`` change the conductivity of the deformed skin."""
         if not touches:
             return NO_CHANGE
@@ -107,12 +104,10 @@ class States:
             self._changes[key] = self._covered(touches, deformation)
         return self._changes[key]
 
-    def _covered(self, touches: tuple[TrueTouch, ...], how: Deformation | Flexed) -> Change:
-        if not isinstance(how, Flexed):
-            return self._cover.change(touches, None if how == FLAT else how.matrix)
-        if self._flexed is None or self._flexed[0] is not how:
-            self._flexed = how, Cover(lifted(self._cover.mesh, how.surface))
-        return self._flexed[1].change(touches)
+    def _covered(self, touches: tuple[TrueTouch, ...], how: Deformation) -> Change:
+        if self._covered_as[0] != how:
+            self._covered_as = how, how.covered(self._cover)
+        return self._covered_as[1].change(touches)
 
     def mix(self, frame: int, times_s: FloatArray) -> Mix:
         """Return the states of ``frame``'s rows at their instants (m,)."""

@@ -16,6 +16,7 @@ errors.
 """
 
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +70,14 @@ class Cover:
             PlaneChart(mesh) if mesh.surface is None else SurfaceChart(mesh, mesh.surface)
         )
         self._corners = self._chart.element_corners
+        self._deformation: FloatArray | None = None
+
+    def deformed(self, matrix: FloatArray) -> "Cover":
+        """Return the cover of the skin that is deformed by ``matrix`` (2, 2) from what it is here.
+        Touches move with the material."""
+        other = copy(self)
+        other._deformation = matrix if self._deformation is None else matrix @ self._deformation
+        return other
 
     def of(self, touch: TrueTouch) -> tuple[IntArray, FloatArray]:
         """Return the elements (e,) that ``touch`` meets, ascending, and the covered part of each
@@ -79,9 +88,8 @@ class Cover:
         met = part > 0
         return near[met], part[met]
 
-    def change(self, touches: Iterable[TrueTouch], deformation: FloatArray | None = None) -> Change:
-        """Return how ``touches`` change the conductivity. On a skin that is deformed by the matrix
-        ``deformation`` (2, 2), touches move with the material.
+    def change(self, touches: Iterable[TrueTouch]) -> Change:
+        """Return how ``touches`` change the conductivity.
 
         If touches share an element, their changes add; the factor is at least a thousandth
         everywhere.
@@ -96,8 +104,9 @@ class Cover:
         met = np.flatnonzero((sigma != 1.0).any(axis=1))
         elements, sigma, normal = elements[met], sigma[met], normal[met]
         corners = self._corners[elements]
-        if deformation is not None:
-            corners, normal = corners @ deformation.T, normal @ np.linalg.inv(deformation)
+        if self._deformation is not None:
+            corners = corners @ self._deformation.T
+            normal = normal @ np.linalg.inv(self._deformation)
         normal = _unit(normal)
         tensor = _tensors(corners, sigma, normal, sharp[met])
         return Change(elements, sigma.mean(axis=1), tensor)

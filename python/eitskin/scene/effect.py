@@ -39,7 +39,7 @@ from eitskin.arrays import ComplexArray as ComplexArray
 from eitskin.arrays import FloatArray as FloatArray
 from eitskin.errors import ConfigError
 from eitskin.fem.mesh import Mesh
-from eitskin.scene.deformation import Deformation, Flexed
+from eitskin.scene.deformation import Deformation
 from eitskin.skin.protocol import Protocol as ScanProtocol
 from eitskin.skin.skin import Skin
 
@@ -214,14 +214,14 @@ class MaterialStep:
 
 @dataclass(frozen=True, eq=False)
 class DeformationStep:
-    """``apply(time_s, frame)`` deforms skin and electrodes: ``Deformation`` a flat skin, where
-    several steps are applied in turn, and ``Flexed`` one that covers a surface. Frames with equal
-    deformations share a solve."""
+    """``apply(time_s, frame)`` deforms skin and electrodes; several steps are applied in turn.
+    ``of_surfaces`` says whether it is for skins that cover a surface, or for flat ones. Frames with
+    equal deformations share a solve."""
 
     name: str
     cost: EffectCost
     note: str
-    apply: Callable[[float, int], Deformation | Flexed]
+    apply: Callable[[float, int], Deformation]
     varies: bool = True
     stage: Stage = Stage.MATERIAL
     of_surfaces: bool = False

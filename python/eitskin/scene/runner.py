@@ -13,7 +13,7 @@ from eitskin.errors import ConfigError
 from eitskin.frames.frames import Frames
 from eitskin.progress import Progress, silent
 from eitskin.scene.compiler import Compiled, State, background_of, compile_scene, used_in
-from eitskin.scene.deformation import FLAT, Deformation, Flexed, deformed, thickness_of
+from eitskin.scene.deformation import FLAT, Deformation, deformed
 from eitskin.scene.description import Scene
 from eitskin.scene.forward_steps import Factorise, FactoriseComplex, Forward, Update, Work
 from eitskin.scene.motion import Mix
@@ -53,7 +53,7 @@ class FrameMaker:
     def __init__(self, compiled: Compiled) -> None:
         self.compiled, self.work = compiled, Work()
         self._forward, self._background = forward_of(compiled, self.work), background_of(compiled)
-        self._last: tuple[Deformation | Flexed, Forward, FloatArray, FloatArray] | None = None
+        self._last: tuple[Deformation, Forward, FloatArray, FloatArray] | None = None
         self._read = _reader(compiled)
         self._times = compiled.times_s()
         states = compiled.states
@@ -75,13 +75,13 @@ class FrameMaker:
             background, impedance = background * elements, impedance / contacts
         return self._read(forward.electrodes(background, state.change, impedance), state)
 
-    def _deformed(self, how: Deformation | Flexed) -> tuple[Forward, FloatArray, FloatArray]:
+    def _deformed(self, how: Deformation) -> tuple[Forward, FloatArray, FloatArray]:
         """Return the forward step of a deformed skin, and the thickness of its elements and under
         its electrodes; the last ones are kept."""
         if self._last is None or self._last[0] != how:
             model = deformed(self.compiled.model, how)
             forward = forward_of(replace(self.compiled, model=model), self.work)
-            self._last = how, forward, *thickness_of(self.compiled.model.mesh, how)
+            self._last = how, forward, *how.thickness_of(self.compiled.model.mesh)
         return self._last[1:]
 
     def frame(self, frame: int, row_times_s: FloatArray | None = None) -> FloatArray:

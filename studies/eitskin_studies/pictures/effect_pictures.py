@@ -1,13 +1,14 @@
 """One picture an effect: its law on the left, on the right what it adds to a frame.
 
-The frame is that of a press on the paper's skin; on the right stands the frame with the effect
-minus the frame without it. Parameters are chosen to be seen, and stand above the picture.
-docs/reference/effects/README.md shows all. ``eitskin draw effect NAME -o PNG`` makes one
-picture.
+The frame is that of a press on the paper's skin, or on a forearm's if the effect is for skins that
+cover a surface; on the right stands the frame with the effect minus the frame without it.
+Parameters are chosen to be seen, and stand above the picture. docs/reference/effects/README.md
+shows all. ``eitskin draw effect NAME -o PNG`` makes one picture.
 """
 
 import io
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from eitskin.scene.description import scene_from_table
 from eitskin.scene.effect import EffectSession
 from eitskin.scene.runner import simulate_frames
 from eitskin.scene.streams import stream
+from eitskin.surface.shapes import make_shape, write_obj
 from eitskin.view.pictures import STYLE, load_matplotlib
 from eitskin_studies.pictures.effect_sketches import LIGHT, SKETCHES, STRONG
 
@@ -37,12 +39,21 @@ ELEMENTS = 2000
 FRAMES = 40
 RATE_HZ = 20.0
 
+OF_SURFACES = ("flex",)
+FOREARM = """
+[skin]
+surface = "forearm.obj"
+[electrodes]
+count = 16
+width_mm = 5.0
+"""
 PRESS = {"x_mm": 30.0, "y_mm": 20.0, "radius_mm": 12.0}
 SHOWN: dict[str, dict[str, Any]] = {
     "out_of_round": {"spread": 0.05},
     "misplacement": {"spread_mm": 6.0},
     "stretch": {"strain": 0.1, "at_s": 0.5, "rise_s": 1.0},
     "bend": {"radius_mm": 100.0},
+    "flex": {"surface": "flexed_forearm.obj"},
     "creep": {"strain": 0.05, "time_constant_s": 0.5, "until_s": 1.0},
     "background": {"spread": 0.2, "length_mm": 25.0},
     "temperature": {"offset_k": 2.0, "drift_k_per_min": 0.5},
@@ -81,9 +92,13 @@ def draw_effect(path: str | Path, name: str) -> None:
     if name not in SKETCHES:
         raise UsageError(f"no picture of an effect {name!r}; {nearest(name, SKETCHES)}")
     matplotlib = load_matplotlib()
-    without, _, _ = press_frames({})
-    frames, parameters, skin_session = press_frames({name: SHOWN[name]})
-    with matplotlib.rc_context(STYLE):
+    with TemporaryDirectory() as made, matplotlib.rc_context(STYLE):
+        folder = Path(made)
+        skin = write_forearm(folder) if name in OF_SURFACES else ""
+        without, _, _ = press_frames({}, skin=skin, folder=folder)
+        frames, parameters, skin_session = press_frames(
+            {name: SHOWN[name]}, skin=skin, folder=folder
+        )
         figure = matplotlib.figure.Figure(figsize=(8.2, 3.3), layout="compressed")
         left, right = figure.subplots(1, 2)
         SKETCHES[name](left, skin_session, parameters[name])
@@ -95,11 +110,23 @@ def draw_effect(path: str | Path, name: str) -> None:
         save_small_png(figure, path)
 
 
+def write_forearm(folder: Path) -> str:
+    """Write a skin on a forearm to ``folder``, with the mesh of its pose, and return its name."""
+    for name in ("forearm", "flexed_forearm"):
+        write_obj(folder / f"{name}.obj", *make_shape(name))
+    (folder / "forearm.toml").write_text(FOREARM)
+    return "forearm.toml"
+
+
 def press_frames(
-    effects: dict[str, Any], touch: dict[str, Any] | None = None
+    effects: dict[str, Any],
+    touch: dict[str, Any] | None = None,
+    skin: str = "",
+    folder: Path = Path(),
 ) -> tuple[FloatArray, dict[str, Any], EffectSession]:
     """All frames (n, m) of the press, the effects' parameters, and a session to make effects in.
-    ``touch`` adds keys to the touch's table, or replaces them."""
+    ``touch`` adds keys to the touch's table, or replaces them. The skin is the paper's, or the one
+    whose description is the file ``skin`` in ``folder``."""
     table = {
         "scene": {
             "name": "press",
@@ -107,11 +134,12 @@ def press_frames(
             "quiet_frames": 2,
             "rate_hz": RATE_HZ,
             "elements": ELEMENTS,
+            **({"skin": skin} if skin else {}),
         },
         "touch": [{**PRESS, **(touch or {})}],
         "effects": effects,
     }
-    compiled = compile_scene(scene_from_table(table, "the picture's scene", Path()))
+    compiled = compile_scene(scene_from_table(table, "the picture's scene", folder))
     scene = compiled.scene
 
     def exact() -> FloatArray:
@@ -130,6 +158,7 @@ def press_frames(
         build_mesh=lambda: mesh_for_elements(scene.skin, ELEMENTS),
         solve_v0=exact,
         make_stream=lambda name, index: stream(scene.seed, name, index),
+        folder=folder,
     )
     return simulate_frames(compiled).voltage_v, compiled.parameters, session
 

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from eitskin.arrays import FloatArray
+from eitskin.fem.mesh import Mesh
 from eitskin.scene.effect import EffectSession
 from eitskin.scene.scan import channels, row_delays_s
 from eitskin.view.pictures import ELECTRODE, FOUND, INK, RIM
@@ -58,17 +60,20 @@ def background(axes: Axes, session: EffectSession, parameters: Any) -> None:
     mesh = session.mesh
     factors = pattern(mesh.centroids_mm(), mesh.areas_mm2, parameters, session.stream(NAME))
     size = float(np.abs(factors - 1).max())
-    colour: dict[str, Any] = {
-        "triangles": mesh.triangles,
-        "cmap": "RdBu_r",
-        "vmin": 1 - size,
-        "vmax": 1 + size,
-    }
-    shown = axes.tripcolor(mesh.nodes_mm[:, 0], mesh.nodes_mm[:, 1], facecolors=factors, **colour)
-    bar = axes.figure.colorbar(shown, ax=axes, shrink=0.8)
-    bar.set_label("conductivity / its mean")
+    colour = {"cmap": "RdBu_r", "vmin": 1 - size, "vmax": 1 + size}
+    _on_mesh(axes, mesh, factors, "conductivity / its mean", colour)
+    axes.set_title("the pattern")
+
+
+def _on_mesh(
+    axes: Axes, mesh: Mesh, values: FloatArray, label: str, colour: dict[str, Any]
+) -> None:
+    """Colour the elements of ``mesh`` by ``values`` (E,)."""
+    colour = {"triangles": mesh.triangles, "facecolors": values, **colour}
+    shown = axes.tripcolor(mesh.nodes_mm[:, 0], mesh.nodes_mm[:, 1], **colour)
+    axes.figure.colorbar(shown, ax=axes, shrink=0.8).set_label(label)
     axes.set_aspect("equal")
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", title="the pattern")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)")
 
 
 def misplacement(axes: Axes, session: EffectSession, parameters: Any) -> None:
@@ -107,10 +112,10 @@ def out_of_round(axes: Axes, session: EffectSession, parameters: Any) -> None:
 def stretch(axes: Axes, session: EffectSession, parameters: Any) -> None:
     """Rim and electrodes, flat and stretched."""
     from eitskin.scene.deformation import FLAT
-    from eitskin.scene.effects.stretch import make
+    from eitskin.scene.effects.stretch import stretched_at
 
-    skin, whole_s = session.skin, parameters.at_s + parameters.rise_s
-    pulled = make(parameters, session).apply(whole_s, 0)
+    skin = session.skin
+    pulled = stretched_at(parameters.at_s + parameters.rise_s, parameters)
     rim = skin.outline.points_at(np.linspace(0, skin.outline.perimeter_mm, 361))
     for how, colour, label in ((FLAT, LIGHT, "flat"), (pulled, STRONG, "stretched")):
         axes.plot(*(rim @ how.matrix.T).T, color=colour, label=label)
@@ -137,6 +142,19 @@ def bend(axes: Axes, session: EffectSession, parameters: Any) -> None:
     axes.legend(frameon=False)
     title = "acts as a stretch between held sides"
     axes.set(xlabel="radius (mm)", ylabel="lengthening (%)", title=title)
+
+
+def flex(axes: Axes, session: EffectSession, parameters: Any) -> None:
+    """How thick the skin is in the pose, on the flattened copy."""
+    from eitskin.scene.effects.flex import make
+
+    skin, mesh, whole_s = session.skin, session.mesh, parameters.at_s + parameters.rise_s
+    thickness, _ = make(parameters, session).apply(whole_s, 0).thickness_of(mesh)
+    _on_mesh(axes, mesh, thickness, "thickness / at rest", {"cmap": "viridis"})
+    rim = skin.outline.points_at(np.linspace(0, skin.outline.perimeter_mm, 361))
+    axes.plot(*rim.T, color=RIM, linewidth=0.8)
+    axes.plot(*skin.electrode_centres_mm().T, "s", color=ELECTRODE, ms=4)
+    axes.set_title("the flattened copy of a forearm's skin")
 
 
 def creep(axes: Axes, session: EffectSession, parameters: Any) -> None:
@@ -428,7 +446,7 @@ def jitter(axes: Axes, session: EffectSession, parameters: Any) -> None:
 SKETCHES: dict[str, Callable[[Any, EffectSession, Any], None]] = {
     sketch.__name__: sketch
     for sketch in (
-        out_of_round, misplacement, stretch, bend, creep,
+        out_of_round, misplacement, stretch, bend, flex, creep,
         background, temperature, gel_drying, sheet_change,
         contact_impedance, detached, bridged,
         phase,

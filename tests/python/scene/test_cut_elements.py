@@ -168,7 +168,7 @@ def test_a_skin_that_is_turned_as_a_whole_measures_the_same(coarse):
     touches, cover = _drawn(TouchRules(shape="ellipse"), 1)[0].touches, Cover(coarse.mesh)
     sheet = np.full(mesh.n_elements, 0.01)
     flat_v = coarse.voltages(with_touches(sheet, cover.change(touches)))
-    turned_v = turned.voltages(with_touches(sheet, cover.change(touches, turn)))
+    turned_v = turned.voltages(with_touches(sheet, cover.deformed(turn).change(touches)))
     assert turned_v == pytest.approx(flat_v, rel=1e-9)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from eitskin.arrays import FloatArray
 from eitskin.config import parameter
 from eitskin.errors import ConfigError
-from eitskin.scene.deformation import FLAT, Deformation, Flexed
+from eitskin.scene.deformation import FLAT, Deformation, FlexedSurface
 from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Stage, part_at
 from eitskin.surface.mesh_file import UNITS_MM, read_surface
 from eitskin.surface.surface_map import SurfaceMap
@@ -46,13 +46,13 @@ def make(parameters: Parameters, session: EffectSession) -> DeformationStep:
             " covers a surface"
         )
     posed_mm = posed_points_mm(rest, session.folder / parameters.surface, parameters.surface_unit)
-    kept: dict[float, Deformation | Flexed] = {0.0: FLAT}
+    kept: dict[float, Deformation] = {0.0: FLAT}
 
-    def apply(time_s: float, frame: int) -> Deformation | Flexed:
+    def apply(time_s: float, frame: int) -> Deformation:
         part = part_at(time_s, parameters.at_s, parameters.rise_s)
         if part not in kept:
             points_mm = (1 - part) * rest.points_mm + part * posed_mm
-            kept[part] = Flexed(replace(rest, points_mm=points_mm))
+            kept[part] = FlexedSurface(replace(rest, points_mm=points_mm))
         return kept[part]
 
     states = {part_at(float(t), parameters.at_s, parameters.rise_s) for t in session.times_s()}

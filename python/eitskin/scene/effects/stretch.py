@@ -10,7 +10,7 @@ skin, let the pull begin before the untouched frames (``at_s`` of -1000).
 from dataclasses import dataclass
 
 from eitskin.config import parameter
-from eitskin.scene.deformation import Deformation, stretched
+from eitskin.scene.deformation import Deformation, EvenDeformation, stretched
 from eitskin.scene.effect import DeformationStep, EffectCost, EffectSession, Stage, part_at
 
 NAME = "stretch"
@@ -30,14 +30,18 @@ class Parameters:
     rise_s: float = parameter(0.0, "s", "time until it is complete; 0: at once", low=0)
 
 
+def stretched_at(time_s: float, parameters: Parameters) -> EvenDeformation:
+    """Return the deformation at a time; the strain rises linearly."""
+    along = 1 + parameters.strain * part_at(time_s, parameters.at_s, parameters.rise_s)
+    across = along**-0.5 if parameters.sides == "free" else 1.0
+    return stretched(along, across, parameters.direction_deg)
+
+
 def make(parameters: Parameters, session: EffectSession) -> DeformationStep:
-    """Return the step in which the strain rises linearly; frames with equal strain share a
-    solve."""
+    """Return the step; frames with equal strain share a solve."""
 
     def apply(time_s: float, frame: int) -> Deformation:
-        along = 1 + parameters.strain * part_at(time_s, parameters.at_s, parameters.rise_s)
-        across = along**-0.5 if parameters.sides == "free" else 1.0
-        return stretched(along, across, parameters.direction_deg)
+        return stretched_at(time_s, parameters)
 
     states = {apply(float(t), k) for k, t in enumerate(session.times_s())}
     note = f"{100 * parameters.strain:g} % from {parameters.at_s:g} s on, sides {parameters.sides}"

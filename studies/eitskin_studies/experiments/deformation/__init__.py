@@ -9,7 +9,7 @@ from eitskin.arrays import FloatArray
 from eitskin.errors import FrameError
 from eitskin.fem.cem import ForwardModel
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.scene.deformation import Deformation, deformed, stretched
+from eitskin.scene.deformation import EvenDeformation, deformed, stretched
 from eitskin.scene.effects.bend import Parameters, lengthening
 from eitskin.scene.random_touches import TouchSet, random_touches
 from eitskin.scene.simulate import Measurement, conductivity_with, measure
@@ -33,9 +33,9 @@ TITLE = "Touches on a skin that is stretched or bent, by the model of the flat o
 USUAL, SNR_DB, UNTOUCHED = 100, 60.0, 50
 
 
-def deformations(thickness_mm: float) -> dict[str, Deformation]:
+def deformations(thickness_mm: float) -> dict[str, EvenDeformation]:
     """Those of the page; a bend is the stretch between held sides that conducts alike."""
-    found = {"flat": Deformation()}
+    found = {"flat": EvenDeformation()}
     for percent in (5, 10, 20):
         along = 1 + percent / 100
         found[f"stretched by {percent} %"] = stretched(along, along**-0.5, 0)
@@ -77,7 +77,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
 
 
 def _solved(
-    forward: ForwardModel, contact: FloatArray, how: Deformation, drawn: TouchSet, sheet: float
+    forward: ForwardModel, contact: FloatArray, how: EvenDeformation, drawn: TouchSet, sheet: float
 ) -> dict[str, FloatArray]:
     """``quiet`` (m,) and ``frames`` (k, m) in V of the deformed skin; touches move with it."""
     model, mesh, thick = deformed(forward, how), forward.mesh, how.thickness

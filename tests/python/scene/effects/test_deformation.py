@@ -11,9 +11,11 @@ from eitskin.errors import ConfigError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import mesh_for_elements
 from eitskin.scene.compiler import compile_scene
-from eitskin.scene.deformation import Deformation, deformed, one_after_another, stretched
+from eitskin.scene.cover import Cover
+from eitskin.scene.deformation import FLAT, EvenDeformation, deformed, one_after_another, stretched
 from eitskin.scene.description import scene_from_table
 from eitskin.scene.effects import bend, creep, stretch
+from eitskin.scene.random_touches import TrueTouch
 from eitskin.scene.runner import simulate_frames
 from eitskin.skin.electrodes import Electrodes
 from eitskin.skin.outline import polygon
@@ -50,8 +52,18 @@ def test_a_strip_resists_by_the_square_of_its_length(along, across, ratio):
 
 
 def test_deformations_follow_each_other():
-    back = one_after_another([stretched(1.2, 0.9, 30), stretched(1 / 1.2, 1 / 0.9, 30)])
-    assert np.allclose(back.matrix, np.eye(2)) and back.thickness == pytest.approx(1)
+    mesh = mesh_for_elements(STRIP, 500)
+    touch = [TrueTouch(50.0, 5.0, 4.0, 4.0)]
+    steps = [FLAT, stretched(1.2, 0.9, 30), stretched(1.1, 1.3, 70)]
+    both, cover = one_after_another(steps), Cover(mesh)
+    whole = EvenDeformation(*(steps[2].matrix @ steps[1].matrix).ravel())
+    assert np.allclose(both.moved(mesh).nodes_mm, whole.moved(mesh).nodes_mm)
+    for found, expected in zip(both.thickness_of(mesh), whole.thickness_of(mesh), strict=True):
+        assert np.allclose(found, expected)
+    assert np.allclose(
+        both.covered(cover).change(touch).tensor, whole.covered(cover).change(touch).tensor
+    )
+    assert one_after_another([FLAT, steps[1]]) is steps[1] and one_after_another([FLAT]) is FLAT
     turned = stretched(2, 1, 90)
     assert np.allclose(turned.matrix, [[1, 0], [0, 2]]) and turned.thickness == 0.5
 
@@ -121,4 +133,6 @@ def test_free_sides_come_in(make_session):
         stretch.make(stretch.Parameters(strain=0.21, sides=sides), make_session()).apply(1.0, 9)
         for sides in ("free", "held")
     )
-    assert free == Deformation(1.21, 0, 0, 1 / sqrt(1.21)) and held == Deformation(1.21, 0, 0, 1)
+    assert free == EvenDeformation(1.21, 0, 0, 1 / sqrt(1.21)) and held == EvenDeformation(
+        1.21, 0, 0, 1
+    )
