@@ -54,6 +54,28 @@ WRITTEN_OUT = {
         "({} == R(1.25) ? ratio * eits_sqrt(eits_sqrt(ratio)) : powf(ratio, {}))",
     ),
 }
+# static objects that have constants in them, which C allows only for values that the compiler
+# knows: file, its text, and the text for variables
+STATIC_OBJECTS = (
+    ("joint/fit.c", "static const eits_real most[EITS_JOINT_ELLIPSE]", "const eits_real most[]"),
+    (
+        "joint/prior.c",
+        """static const kind LIGHT = {EITS_JOINT_LIGHT, EITS_JOINT_LIGHT_SPREAD},
+                  STRONG = {EITS_JOINT_STRONG, EITS_JOINT_STRONG_SPREAD},
+                  INSULATING = {EITS_JOINT_INSULATING, EITS_JOINT_INSULATING_SPREAD};
+""",
+        """static const kind *study_kind(int place, eits_real amplitude, eits_real spread)
+{
+    static kind kinds[3];
+    kinds[place] = (kind){amplitude, spread};
+    return &kinds[place];
+}
+#define LIGHT (*study_kind(0, EITS_JOINT_LIGHT, EITS_JOINT_LIGHT_SPREAD))
+#define STRONG (*study_kind(1, EITS_JOINT_STRONG, EITS_JOINT_STRONG_SPREAD))
+#define INSULATING (*study_kind(2, EITS_JOINT_INSULATING, EITS_JOINT_INSULATING_SPREAD))
+""",
+    ),
+)
 _DECLARED = """
 extern float eits_study_real[{count}];
 extern int eits_study_whole[{count}];
@@ -239,25 +261,34 @@ def _define(one: Constant) -> str:
 
 
 def _sources(folder: Path, root: Path, constants: list[Constant]) -> list[Path]:
-    """The core's sources, those that write a constant out rewritten."""
+    """The core's sources, rewritten where a variable cannot stand as the constant does."""
     base = root / "csrc" / "src"
     left_out = {"m7.c"} if _has_avx2() else {"m7.c", "avx2.c"}
     found = [path for path in sorted(base.glob("*/*.c")) if path.name not in left_out]
     known = {one.name for one in constants}
     for name, (file, text, varied) in WRITTEN_OUT.items():
-        if name not in known:
-            continue
-        original = (base / file).read_text(encoding="ascii")
-        if text not in original:
-            raise UsageError(f"constants: {file} does not have {text!r} for {name}")
-        header = f'#include "{Path(file).parent}/constants.h"\n#include <math.h>\n'
-        rewritten = folder / file
-        rewritten.write_text(
-            header + original.replace(text, varied.format(f"EITS_{name}", f"EITS_{name}")),
-            encoding="ascii",
-        )
-        found[found.index(base / file)] = rewritten
+        if name in known:
+            header = f'#include "{Path(file).parent}/constants.h"\n#include <math.h>\n'
+            new = varied.format(f"EITS_{name}", f"EITS_{name}")
+            _rewrite(folder, base, found, file, text, new, header)
+    for file, text, varied in STATIC_OBJECTS:
+        _rewrite(folder, base, found, file, text, varied)
     return [*found, folder / "study_tables.c"]
+
+
+def _rewrite(
+    folder: Path, base: Path, sources: list[Path], file: str, text: str, new: str, header: str = ""
+) -> None:
+    """Replace a source by a copy in ``folder`` in which ``new`` stands for ``text``.
+
+    Raises:
+        UsageError: the source does not have ``text``.
+    """
+    original = (base / file).read_text(encoding="ascii")
+    if text not in original:
+        raise UsageError(f"constants: {file} does not have {text!r}")
+    (folder / file).write_text(header + original.replace(text, new), encoding="ascii")
+    sources[sources.index(base / file)] = folder / file
 
 
 def _binding(folder: Path, root: Path, count: int) -> Path:
