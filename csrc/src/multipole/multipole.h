@@ -28,10 +28,10 @@
 #include "base/vec.h"
 #include "context/context.h"
 
-/* Orders that answer at most. The Taylor series has EITS_POLE_TERMS coefficients a_1, a_2 ... of
- * each electrode's potential (eitskin/sizes.h): the one more gives slopes by place. At most
- * EITS_POLE_SENT outgoing orders reach other touches. */
-enum { EITS_POLE_ORDERS = EITS_POLE_TERMS - 1 };
+/* Orders that an ellipse and a disc answer. The Taylor series has EITS_POLE_TERMS coefficients a_1,
+ * a_2 ... of each electrode's potential (eitskin/sizes.h): the one more gives slopes by place. At
+ * most EITS_POLE_SENT outgoing orders reach other touches. */
+enum { EITS_POLE_ORDERS = EITS_POLE_TERMS - 1, EITS_POLE_DISC_ORDERS = 3 };
 
 /* A touch as the joint fit varies it. */
 typedef struct eits_shape {
@@ -43,7 +43,7 @@ typedef struct eits_shape {
 
 /* How much of the model is used. */
 typedef struct eits_poles {
-    uint32_t orders; /* that answer: 1 to EITS_POLE_ORDERS */
+    uint32_t orders; /* that answer: EITS_POLE_DISC_ORDERS for discs, else EITS_POLE_ORDERS */
     uint32_t sent;   /* outgoing orders that reach others: 1 to EITS_POLE_SENT */
 } eits_poles;
 
@@ -101,7 +101,8 @@ eits_real eits_pole_room(const eits_context *ctx, uint32_t k, const eits_shape *
 void eits_pole_lift(eits_context *ctx, uint32_t k);
 
 /* rows.c: where to put a shape's answer on folds first ... first + count - 1, and its slopes by x,
- * y, log(radius), amplitude, e1, e2 with the induced field held; a null pointer: not wanted. */
+ * y, log(radius), amplitude and, unless `poles` are those of discs, e1 and e2, with the induced
+ * field held. All slopes are made where slope[0] is not NULL. */
 typedef struct eits_pole_out {
     eits_real *value;
     eits_real *slope[6];

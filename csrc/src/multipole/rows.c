@@ -12,7 +12,8 @@
 
 static const eits_real PI = R(3.14159265358979323846);
 
-enum { ORDERS = EITS_POLE_ORDERS, TERMS = EITS_POLE_TERMS, SLOPES = 6 };
+enum { ORDERS = EITS_POLE_ORDERS, OF_DISC = EITS_POLE_DISC_ORDERS, TERMS = EITS_POLE_TERMS };
+enum { SLOPES_OF_DISC = 4, SLOPES = 6 };
 
 /* What orders weigh in a row's voltage: c for products of real parts, s of imaginary ones. */
 typedef struct order_weights {
@@ -72,53 +73,33 @@ static answering answering_of(const eits_context *ctx, const eits_shape *shape, 
     return a;
 }
 
-/* beta_n = sum over k of T_nk a_k. Five orders, as ellipses have them, are written out: a compiler
- * does not unroll such loops. */
-static inline void to_modes(const eits_form *f, uint32_t orders, const eits_complex *a,
-                            eits_complex *beta)
+/* beta_n = sum over k of T_nk a_k, written out: a compiler does not unroll such loops. */
+static inline void to_modes(const eits_form *f, const eits_complex *a, eits_complex *beta)
 {
-    if (orders == 5u) {
-        const eits_complex(*t)[ORDERS] = f->to_mode;
-        beta[0] = eits_plus_times(eits_plus_times(eits_times(t[0][0], a[0]), t[0][2], a[2]),
-                                  t[0][4], a[4]);
-        beta[1] = eits_plus_times(eits_times(t[1][1], a[1]), t[1][3], a[3]);
-        beta[2] = eits_plus_times(eits_times(t[2][2], a[2]), t[2][4], a[4]);
-        beta[3] = eits_times(t[3][3], a[3]);
-        beta[4] = eits_times(t[4][4], a[4]);
-        return;
-    }
-    for (uint32_t n = 0; n < orders; ++n) {
-        eits_complex sum = eits_times(f->to_mode[n][n], a[n]);
-        for (uint32_t k = n + 2u; k < orders; k += 2u)
-            sum = eits_plus_times(sum, f->to_mode[n][k], a[k]);
-        beta[n] = sum;
-    }
+    const eits_complex(*t)[ORDERS] = f->to_mode;
+    beta[0] =
+        eits_plus_times(eits_plus_times(eits_times(t[0][0], a[0]), t[0][2], a[2]), t[0][4], a[4]);
+    beta[1] = eits_plus_times(eits_times(t[1][1], a[1]), t[1][3], a[3]);
+    beta[2] = eits_plus_times(eits_times(t[2][2], a[2]), t[2][4], a[4]);
+    beta[3] = eits_times(t[3][3], a[3]);
+    beta[4] = eits_times(t[4][4], a[4]);
 }
 
 /* c_k = sum over n of T_nk g_n with g = w_c Re beta - i w_s Im beta: then the real part of
  * sum c_k m_k is the answer to a measuring pair's m_k. */
-static inline void answer_of(const eits_form *f, uint32_t orders, const order_weights *w,
-                             const eits_complex *beta, eits_complex *c)
+static inline void answer_of(const eits_form *f, const order_weights *w, const eits_complex *beta,
+                             eits_complex *c)
 {
+    const eits_complex(*t)[ORDERS] = f->to_mode;
     eits_complex g[ORDERS];
-    for (uint32_t n = 0; n < orders; ++n)
+    for (uint32_t n = 0; n < ORDERS; ++n)
         g[n] = (eits_complex){w->c[n] * beta[n].re, -(w->s[n] * beta[n].im)};
-    if (orders == 5u) {
-        const eits_complex(*t)[ORDERS] = f->to_mode;
-        c[0] = eits_times(t[0][0], g[0]);
-        c[1] = eits_times(t[1][1], g[1]);
-        c[2] = eits_plus_times(eits_times(t[2][2], g[2]), t[0][2], g[0]);
-        c[3] = eits_plus_times(eits_times(t[3][3], g[3]), t[1][3], g[1]);
-        c[4] = eits_plus_times(eits_plus_times(eits_times(t[4][4], g[4]), t[0][4], g[0]), t[2][4],
-                               g[2]);
-        return;
-    }
-    for (uint32_t k = 0; k < orders; ++k) {
-        eits_complex sum = eits_times(f->to_mode[k][k], g[k]);
-        for (uint32_t n = k % 2u; n < k; n += 2u)
-            sum = eits_plus_times(sum, f->to_mode[n][k], g[n]);
-        c[k] = sum;
-    }
+    c[0] = eits_times(t[0][0], g[0]);
+    c[1] = eits_times(t[1][1], g[1]);
+    c[2] = eits_plus_times(eits_times(t[2][2], g[2]), t[0][2], g[0]);
+    c[3] = eits_plus_times(eits_times(t[3][3], g[3]), t[1][3], g[1]);
+    c[4] =
+        eits_plus_times(eits_plus_times(eits_times(t[4][4], g[4]), t[0][4], g[0]), t[2][4], g[2]);
 }
 
 /* By what a drive multiplies a measuring pair's numbers (real part and imaginary part of each
@@ -166,71 +147,71 @@ static inline void put_moves(drive *d, uint32_t orders, const eits_complex *c, e
 }
 
 /* A disc's orders do not couple, and its amplitude scales all of them alike. */
-static inline void disc_drive(const answering *s, uint32_t orders, eits_real by_amplitude_share,
-                              int slopes, const eits_complex *a, drive *d)
+static void disc_drive(const answering *s, eits_real by_amplitude_share, int slopes,
+                       const eits_complex *a, drive *d)
 {
-    eits_complex c[ORDERS], x[TERMS], y[TERMS], other[ORDERS];
-    for (uint32_t k = 0; k < orders; ++k) {
+    eits_complex c[OF_DISC], x[OF_DISC + 1], y[OF_DISC + 1], other[OF_DISC];
+    for (uint32_t k = 0; k < OF_DISC; ++k) {
         const eits_real w = s->weight.c[k] * (s->form.to_mode[k][k].re * s->form.to_mode[k][k].re);
         c[k] = (eits_complex){w * a[k].re, -(w * a[k].im)};
         x[k] = (eits_complex){(eits_real)(k + 2u) * w * a[k + 1u].re,
                               -((eits_real)(k + 2u) * w * a[k + 1u].im)};
         y[k] = (eits_complex){x[k].im, -x[k].re}; /* of i times that field */
     }
-    put(d->by[0], c, orders);
+    put(d->by[0], c, OF_DISC);
     if (!slopes)
         return;
-    put_moves(d, orders, c, x, y);
-    for (uint32_t k = 0; k < orders; ++k)
+    put_moves(d, OF_DISC, c, x, y);
+    for (uint32_t k = 0; k < OF_DISC; ++k)
         other[k] = eits_scaled((eits_real)(2u * (k + 1u)), c[k]);
-    put(d->by[3], other, orders);
-    for (uint32_t k = 0; k < orders; ++k)
+    put(d->by[3], other, OF_DISC);
+    for (uint32_t k = 0; k < OF_DISC; ++k)
         other[k] = eits_scaled(by_amplitude_share, c[k]);
-    put(d->by[4], other, orders);
+    put(d->by[4], other, OF_DISC);
 }
 
 /* The answer, and slopes by place, log radius and amplitude; a_k r^k is what a larger radius
  * scales.
  */
-static inline void ellipse_drive(const answering *s, uint32_t orders, const order_weights *by_q,
-                                 int slopes, const eits_complex *a, eits_complex *c, drive *d)
+static void ellipse_drive(const answering *s, const order_weights *by_q, int slopes,
+                          const eits_complex *a, eits_complex *c, drive *d)
 {
     eits_complex field[ORDERS], beta[ORDERS], mode[ORDERS], x[TERMS], y[TERMS];
-    to_modes(&s->form, orders, a, beta);
-    answer_of(&s->form, orders, &s->weight, beta, c);
-    put(d->by[0], c, orders);
+    to_modes(&s->form, a, beta);
+    answer_of(&s->form, &s->weight, beta, c);
+    put(d->by[0], c, ORDERS);
     if (!slopes)
         return;
-    for (uint32_t k = 0; k < orders; ++k)
+    for (uint32_t k = 0; k < ORDERS; ++k)
         field[k] = eits_scaled((eits_real)(k + 2u), a[k + 1u]);
-    to_modes(&s->form, orders, field, mode);
-    answer_of(&s->form, orders, &s->weight, mode, x);
-    for (uint32_t k = 0; k < orders; ++k)
+    to_modes(&s->form, field, mode);
+    answer_of(&s->form, &s->weight, mode, x);
+    for (uint32_t k = 0; k < ORDERS; ++k)
         mode[k] = (eits_complex){-mode[k].im, mode[k].re};
-    answer_of(&s->form, orders, &s->weight, mode, y);
-    put_moves(d, orders, c, x, y);
-    for (uint32_t k = 0; k < orders; ++k)
+    answer_of(&s->form, &s->weight, mode, y);
+    put_moves(d, ORDERS, c, x, y);
+    for (uint32_t k = 0; k < ORDERS; ++k)
         field[k] = eits_scaled((eits_real)(k + 1u), a[k]);
-    to_modes(&s->form, orders, field, mode);
-    answer_of(&s->form, orders, &s->weight, mode, x);
-    for (uint32_t k = 0; k < orders; ++k) {
+    to_modes(&s->form, field, mode);
+    answer_of(&s->form, &s->weight, mode, x);
+    for (uint32_t k = 0; k < ORDERS; ++k) {
         x[k].re = eits_fma((eits_real)(k + 1u), c[k].re, x[k].re);
         x[k].im = eits_fma((eits_real)(k + 1u), c[k].im, x[k].im);
     }
-    put(d->by[3], x, orders);
-    answer_of(&s->form, orders, by_q, beta, x);
-    put(d->by[4], x, orders);
+    put(d->by[3], x, ORDERS);
+    answer_of(&s->form, by_q, beta, x);
+    put(d->by[4], x, ORDERS);
 }
 
 /* Slope by e1 or e2, as a difference. */
-static inline void slope_by_shape(const answering *more, uint32_t orders, const eits_complex *a,
+static inline void slope_by_shape(const answering *more, const eits_complex *a,
                                   const eits_complex *c, eits_real *by)
 {
     const eits_real per = 1 / EITS_POLE_STEP;
     eits_complex beta[ORDERS], varied_c[ORDERS];
-    to_modes(&more->form, orders, a, beta);
-    answer_of(&more->form, orders, &more->weight, beta, varied_c);
-    for (uint32_t k = 0; k < orders; ++k) {
+    to_modes(&more->form, a, beta);
+    answer_of(&more->form, &more->weight, beta, varied_c);
+    for (uint32_t k = 0; k < ORDERS; ++k) {
         by[2u * k] = (varied_c[k].re - c[k].re) * per;
         by[2u * k + 1u] = (c[k].im - varied_c[k].im) * per;
     }
@@ -318,49 +299,19 @@ static inline eits_real value_of(const eits_real *by, const eits_real *own, uint
     return value;
 }
 
-/* The same for any number of orders and slopes. */
-static void fill_any_row(const drive *d, const eits_real *own, uint32_t electrodes,
-                         const uint8_t *row, uint32_t orders, uint32_t slopes, uint32_t i,
-                         const eits_pole_out *out)
-{
-    const eits_real *plus = own + row[2], *minus = own + row[3];
-    for (uint32_t p = 0; p <= slopes; ++p) {
-        const uint32_t numbers = 2u * (p == 1u || p == 2u ? orders + 1u : orders);
-        eits_real sum = 0;
-        for (uint32_t j = 0; j < numbers; ++j)
-            sum = eits_fma(d->by[p][j],
-                           plus[(size_t)electrodes * j] - minus[(size_t)electrodes * j], sum);
-        if (p == 0)
-            out->value[i] = sum;
-        else
-            out->slope[p - 1u][i] = sum;
-    }
-}
-
 /* The numbers of a drive that its rows share. */
-static void make_drive(const eits_shape *shape, const answering s[3], const order_weights *by_q,
-                       uint32_t slopes, const eits_complex *a, drive *d)
+static void make_drive(const answering s[3], const order_weights *by_q, uint32_t slopes,
+                       const eits_complex *a, drive *d)
 {
-    const uint32_t orders = s[0].form.orders;
-    const int round = shape->e1 == 0 && shape->e2 == 0;
     eits_complex c[ORDERS];
-    if (round && slopes <= 4u) {
-        const eits_real share = s[0].weight.c[0] != 0 ? by_q->c[0] / s[0].weight.c[0] : 0;
-        if (orders == 3u)
-            disc_drive(&s[0], 3, share, slopes > 0, a, d);
-        else
-            disc_drive(&s[0], orders, share, slopes > 0, a, d);
+    if (s[0].form.orders == OF_DISC) {
+        disc_drive(&s[0], s[0].weight.c[0] != 0 ? by_q->c[0] / s[0].weight.c[0] : 0, slopes > 0, a,
+                   d);
         return;
     }
-    if (orders == 5u) {
-        ellipse_drive(&s[0], 5, by_q, slopes > 0, a, c, d);
-        for (uint32_t part = 0; part + 4u < slopes; ++part)
-            slope_by_shape(&s[1u + part], 5, a, c, d->by[5u + part]);
-    } else {
-        ellipse_drive(&s[0], orders, by_q, slopes > 0, a, c, d);
-        for (uint32_t part = 0; part + 4u < slopes; ++part)
-            slope_by_shape(&s[1u + part], orders, a, c, d->by[5u + part]);
-    }
+    ellipse_drive(&s[0], by_q, slopes > 0, a, c, d);
+    for (uint32_t part = 0; part < 2u && slopes > 0; ++part)
+        slope_by_shape(&s[1u + part], a, c, d->by[5u + part]);
 }
 
 uint64_t eits_pole_rows(eits_context *ctx, uint32_t k, const eits_shape *shape,
@@ -368,13 +319,14 @@ uint64_t eits_pole_rows(eits_context *ctx, uint32_t k, const eits_shape *shape,
                         const eits_pole_out *out)
 {
     const uint32_t electrodes = ctx->model->n_electrodes, orders = poles->orders,
-                   slopes = out->slope[0] == NULL ? 0u : (out->slope[4] == NULL ? 4u : 6u);
+                   all = orders == OF_DISC ? SLOPES_OF_DISC : SLOPES,
+                   slopes = out->slope[0] == NULL ? 0u : all;
     const eits_real *own = ctx->multipole.own + EITS_POLE_FIELD(electrodes) * k,
                     *induced = ctx->multipole.induced + EITS_POLE_FIELD(electrodes) * k;
     answering s[3]; /* the shape, and those with a larger e1 and e2 */
     s[0] = answering_of(ctx, shape, orders);
     const order_weights by_q = by_amplitude(&s[0].weight, &s[0].form, shape->amplitude);
-    for (int part = 0; part < 2 && slopes == 6u; ++part) {
+    for (int part = 0; part < 2 && slopes == SLOPES; ++part) {
         const eits_shape larger = varied(shape, part);
         s[1 + part] = answering_of(ctx, &larger, orders);
     }
@@ -386,20 +338,18 @@ uint64_t eits_pole_rows(eits_context *ctx, uint32_t k, const eits_shape *shape,
         if (new_drive(row, before)) {
             eits_complex a[TERMS];
             whole_field(own, induced, electrodes, row, a);
-            make_drive(shape, s, &by_q, slopes, a, &d);
+            make_drive(s, &by_q, slopes, a, &d);
             ++drives;
         }
         before = row;
-        if (slopes == 6u && orders == 5u)
+        if (slopes == SLOPES)
             fill_row(&d, own, electrodes, row, 1, i, out);
-        else if (slopes == 4u && orders == 3u)
+        else if (slopes == SLOPES_OF_DISC)
             fill_row(&d, own, electrodes, row, 0, i, out);
-        else if (slopes == 0u && orders == 5u)
-            out->value[i] = value_of(d.by[0], own, electrodes, row, 10);
-        else if (slopes == 0u && orders == 3u)
-            out->value[i] = value_of(d.by[0], own, electrodes, row, 6);
+        else if (orders == ORDERS)
+            out->value[i] = value_of(d.by[0], own, electrodes, row, 2 * ORDERS);
         else
-            fill_any_row(&d, own, electrodes, row, orders, slopes, i, out);
+            out->value[i] = value_of(d.by[0], own, electrodes, row, 2 * OF_DISC);
     }
     const uint32_t products = shape->e1 == 0 && shape->e2 == 0 ? 4u * orders : 8u * orders;
     return (uint64_t)count * (1u + slopes) * 2u * orders +
