@@ -154,8 +154,10 @@ class SameEverywhere:
     """Runs steps on all three and asserts that they agree; gives the host's outcomes, which are
     then the Cortex-M7's too."""
 
+    width, real = "float32", np.float32
+
     def __init__(self, program: Path, new_folder: Callable[[], Path]) -> None:
-        self._program, self._new_folder = program, new_folder
+        self.program, self.new_folder = program, new_folder
 
     def __call__(
         self,
@@ -192,4 +194,4 @@ class SameEverywhere:
         return statuses, own
 
     def board(self, steps: Sequence[Step]) -> EmulatedRun:
-        return run_steps(self._program, self._new_folder(), steps)
+        return run_steps(self.program, self.new_folder(), steps)

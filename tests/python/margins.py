@@ -6,7 +6,8 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -30,6 +31,7 @@ class Margins:
 
     def __init__(self) -> None:
         self.worst: dict[tuple[str, str], tuple[float, str]] = {}
+        self._everywhere: tuple[str, ...] = ("host f32", "M7")
 
     def record(
         self, case: str, what: str, target: str, measured: float, bound: float, unit: str = ""
@@ -45,9 +47,23 @@ class Margins:
         self, case: str, what: str, measured: float, bound: float, unit: str = ""
     ) -> None:
         """The same for host f32 and M7, where ``same_everywhere`` has shown that both give the same
-        bits."""
-        for target in ("host f32", "M7"):
+        bits; within ``on``, for its target."""
+        for target in self._everywhere:
             self.record(case, what, target, measured, bound, unit)
+
+    @contextmanager
+    def on(self, target: str) -> Iterator[None]:
+        """Within it, ``everywhere`` is this target alone."""
+        before, self._everywhere = self._everywhere, (target,)
+        try:
+            yield
+        finally:
+            self._everywhere = before
+
+    @property
+    def host(self) -> str:
+        """The host's target, for what ``same_everywhere`` does not run."""
+        return self._everywhere[0]
 
     def of(self, case: str) -> Callable[..., None]:
         """``everywhere`` of one case."""

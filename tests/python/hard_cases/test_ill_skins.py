@@ -69,10 +69,12 @@ def test_ill_conditioned_skins(same_everywhere, margins, name):
     for one in by_options[0]:
         assert one.status == 0 and one.finite() and len(one.touches) <= usual.max_touches
         assert one.info.stop in ("iterations", "below-threshold")
-    data = data_of(h, sound, "float32")
+    data = data_of(h, sound, same_everywhere.width)
     for of_solver in by_options[1:]:
         for y, one in zip(data, of_solver, strict=True):
             check_sound(margins, CASE, judged(h.model.sensitivity, y, "increase", one), one)
+    if same_everywhere.width == "float64":
+        return
     _, wide = on_host(steps_for(h, precise), "float64")
     for k, y64 in enumerate(data_of(h, precise, "float64")):
         compare_widths(margins.of(CASE), name, h, by_options[-1][k], wide[k], data[k], y64)

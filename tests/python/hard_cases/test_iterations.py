@@ -81,6 +81,7 @@ def precise(problem: RandomProblem, solver: str, sign: str) -> list[Step]:
     return asked(problem, options)
 
 
+@pytest.mark.parametrize("same_everywhere", ["float32"], indirect=True)
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_float32_against_float64(same_everywhere, margins, solver):
     """Both to a gap of 1e-5 |y|^2/2. The objective is strongly convex in S x: f(x) - f* >= |S (x -

@@ -14,18 +14,18 @@ CASE = "problem/lambda-ends"
 def test_lambda_ends(same_everywhere, margins, solver):
     """Zero from lambda_max on. What "at" means is the core's own sum of ``RANK`` products, read
     back from a first solve."""
-    problem, within = gaussian(1), margins.of(CASE)
+    problem, within, real = gaussian(1), margins.of(CASE), same_everywhere.real
     ask = [asked(problem, problem.options(solver=solver, sign=sign)) for sign in SIGNS]
     _, first = same_everywhere.steps([step for steps in ask for step in steps])
     steps, what = [], []
     for sign, one in zip(SIGNS, first, strict=True):
-        assert abs(one.info.lambda_max / problem.lambda_max(sign) - 1) < RANK * 2.0**-23
-        top = np.float32(one.info.lambda_max)
+        assert abs(one.info.lambda_max / problem.lambda_max(sign) - 1) < RANK * np.finfo(real).eps
+        top = real(one.info.lambda_max)
         for name, value in {  # above and below by one unit in the last place
             "zero": 0.0,
-            "below": float(np.nextafter(top, np.float32(0))),
+            "below": float(np.nextafter(top, real(0))),
             "at": float(top),
-            "above": float(np.nextafter(top, np.float32(1e9))),
+            "above": float(np.nextafter(top, real(1e9))),
             "beyond": 100 * float(top),
         }.items():
             chosen = problem.options(

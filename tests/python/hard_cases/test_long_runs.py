@@ -60,7 +60,8 @@ def test_warm_frames(same_everywhere, margins, solver):
     streams = [
         [*head, Play(np.vstack([np.tile(touched, (held, 1)), after]))] for held in (FEW, HELD)
     ]
-    (_, few), (_, many) = same_everywhere.steps(streams[0]), on_host(streams[1])
+    _, few = same_everywhere.steps(streams[0])
+    _, many = on_host(streams[1], same_everywhere.width)
     assert all((one.image == many[k].image).all() for k, one in enumerate(few[:FEW]))
     assert all(one.status == 0 and one.finite() for one in [*few, *many])
     gaps = np.array([one.info.gap_rel for one in many[:HELD]])
@@ -70,7 +71,7 @@ def test_warm_frames(same_everywhere, margins, solver):
         (f"gap of any of {HELD} warm frames, {solver}", gaps[1:].max(), bound, "|y|^2/2"),
         (f"image moved over the last {HELD // 2} frames, {solver}", late, 0.02, "of its peak"),
     ):
-        margins.record(WARM_CASE, what, "host f32", worst, most, unit)
+        margins.record(WARM_CASE, what, margins.host, worst, most, unit)
     within(f"gap of any of {FEW} warm frames, {solver}", gaps[1:FEW].max(), bound, "|y|^2/2")
     for outcomes in (few[FEW:], many[HELD:]):
         ghost = max(float(np.abs(one.image).max()) for one in outcomes) / peak

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from precision import CHANGES, CONDITIONS, by_change, by_condition, condition_steps
 
 from eitskin.model.options import default_options
@@ -10,6 +11,7 @@ from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
 from small_models import prebuilt
 
 
+@pytest.mark.parametrize("same_everywhere", ["float32"], indirect=True)
 def test_error_over_the_condition_number(same_everywhere, margins):
     """What the data say is as exact at any condition; coefficients lose with it."""
     _, outcomes = same_everywhere.steps(condition_steps())
@@ -19,6 +21,7 @@ def test_error_over_the_condition_number(same_everywhere, margins):
         assert np.isfinite(found.coefficients)
 
 
+@pytest.mark.parametrize("same_everywhere", ["float32"], indirect=True)
 def test_change_down_to_the_last_bit(same_everywhere, margins):
     """The error of the data is what rounding each voltage costs; where nothing is left of the
     change, there is no image and no touch; a last bit in every row gives finite numbers."""

@@ -93,7 +93,7 @@ def test_any_problem(same_everywhere, margins):
     @given(problems())
     def sound(given_problem: dict[str, Any]) -> None:
         s, own = steps_of(given_problem)
-        statuses, outcomes = on_host(own)
+        statuses, outcomes = on_host(own, same_everywhere.width)
         assert statuses == [0, 0]
         for one in outcomes:
             check_sound(

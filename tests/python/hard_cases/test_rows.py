@@ -145,7 +145,7 @@ def test_one_denormal_row(same_everywhere, margins):
 def test_saturation_in_touch(same_everywhere, margins):
     """Rows at the limit are left out and counted apart."""
     good, rows = touched(0), [3, 50, 171]
-    limit = 1.05 * float(np.abs(quiet_frames(0)).max())
+    limit = float(np.float32(1.05 * np.abs(quiet_frames(0)).max()))
     spoilt = good.copy()
     spoilt[rows] = limit, -limit, limit
     clean, one = in_scene_0(same_everywhere, [good, spoilt], saturation_v=limit)

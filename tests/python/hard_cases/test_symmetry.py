@@ -87,9 +87,11 @@ def steps_for(
     return [Load(encode_model(model)), Choose(options), TareStep(untouched), Play(frames)]
 
 
-def data_of(model: Model, options: Options, untouched: np.ndarray, frame: np.ndarray) -> np.ndarray:
+def data_of(
+    model: Model, options: Options, untouched: np.ndarray, frame: np.ndarray, width: str
+) -> np.ndarray:
     """y (r,) as the solver sees it."""
-    host = Host(encode_model(model))
+    host = Host(encode_model(model), width)
     found = [host.status_of(step) for step in (Choose(options), TareStep(as_float32(untouched)))]
     assert found == [0, 0]
     host.solve_frame(as_float32(frame))
@@ -122,11 +124,11 @@ def check_alike(
     ]
     _, outcomes = same_everywhere.steps(steps)
     count = len(frames[0][1])
-    s = models[0].sensitivity
+    s, width = models[0].sensitivity, same_everywhere.width
     for k in range(count):
         one, other = outcomes[k], outcomes[count + k]
         points = [
-            judged(m.sensitivity, data_of(m, options, untouched, given[k]), "increase", o)
+            judged(m.sensitivity, data_of(m, options, untouched, given[k], width), "increase", o)
             for m, (untouched, given), o in zip(models, frames, (one, other), strict=True)
         ]
         size = float(np.linalg.norm(points[0].y))

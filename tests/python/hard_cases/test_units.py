@@ -56,6 +56,7 @@ def check_scaled(
     margins.everywhere(case, "S x in other units", off / size, room, "|y|")
 
 
+@pytest.mark.parametrize("same_everywhere", ["float32"], indirect=True)
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_units_of_model_and_data(same_everywhere, margins, solver):
     """S times a, y times b, each alone and both together: x times b / a, while squares are
@@ -98,10 +99,15 @@ def test_units_of_model_and_data(same_everywhere, margins, solver):
 
 
 def reduced(
-    model: Model, blob: bytes, options: Options, untouched: np.ndarray, frame: np.ndarray
+    model: Model,
+    blob: bytes,
+    options: Options,
+    untouched: np.ndarray,
+    frame: np.ndarray,
+    width: str,
 ) -> np.ndarray:
     """y (r,) as the solver sees it."""
-    engine = CoreEngine(blob)
+    engine = CoreEngine(blob, width)
     engine.set_options(options)
     engine.set_reference(as_float32(untouched).astype(np.float64))
     engine.solve_frame(as_float32(frame))
@@ -129,7 +135,12 @@ def test_units_of_frames(same_everywhere, margins, data_kind):
     norm = float(np.linalg.norm(model.projection.astype(np.float64), 2))
     data_off = 12 * U * norm * float(np.linalg.norm(per_row))
     points = [
-        [reduced(model, blob, options, untouched * 10.0**e, frame * 10.0**e) for frame in frames]
+        [
+            reduced(
+                model, blob, options, untouched * 10.0**e, frame * 10.0**e, same_everywhere.width
+            )
+            for frame in frames
+        ]
         for e in exponents
     ]
     what = f"y, frames in other volts, {data_kind}"
