@@ -7,7 +7,7 @@ from eitskin.cli.arguments import Output, option
 from eitskin.cli.printing import answer
 from eitskin.fileio import refuse_unwritable
 from eitskin.skin.skin import Skin, load_skin
-from eitskin.surface.shapes import SHAPES, make_shape, write_obj
+from eitskin.surface.shapes import MEASURES, SHAPES, make_shape, write_obj
 
 WIDE = 3.0  # a scale above which the answer warns
 
@@ -19,9 +19,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="write the mesh of an example surface",
         description="Write an OBJ file, in mm: "
         + "; ".join(f"{name}, {shape.what}" for name, shape in SHAPES.items())
-        + ".",
+        + ". A tube and a dome have measures, such as those of a URDF's <cylinder> or <sphere>.",
     )
     option(make, "shape", None, choices=tuple(SHAPES))
+    option(make, "--radius-mm MM", "radius of a tube or dome (default: 40)", float)
+    option(make, "--length-mm MM", "length of a tube (default: 200)", float)
+    option(
+        make,
+        "--angle-deg DEG",
+        "angle that a tube or dome covers, as seen from its axis or its middle (default: 300 for a"
+        " tube; 180 for a dome, half a ball)",
+        float,
+    )
     option(make, "--triangles", "about how many", default=4000, within=(50, 2_000_000))
     option(make, "-o --output MESH.obj", "file to write", Output, required=True)
     option(make, "--json")
@@ -41,7 +50,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run_make(options: argparse.Namespace) -> int:
-    points, triangles = make_shape(options.shape, options.triangles)
+    given = {name: getattr(options, name) for name in MEASURES}
+    measures = {name: value for name, value in given.items() if value is not None}
+    points, triangles = make_shape(options.shape, options.triangles, **measures)
     write_obj(options.output, points, triangles)
     facts = {
         "written": str(options.output),

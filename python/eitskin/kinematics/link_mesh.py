@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from eitskin.arrays import FloatArray, IntArray
-from eitskin.config import listed, nearest
+from eitskin.config import listed, nearest, plain_number
 from eitskin.errors import ConfigError, FileError
 from eitskin.kinematics.pose import Pose
 from eitskin.kinematics.urdf import attribute, link_elements, origin_of, three_numbers, urdf_root
@@ -84,7 +84,7 @@ def _only_mesh(
     if not chosen and any(part.tag == "visual" for part, _ in meshes):
         meshes = [(part, mesh) for part, mesh in meshes if part.tag == "visual"]
     if not meshes:
-        raise ConfigError(f"{where}: {_without_mesh(parts)}")
+        raise ConfigError(f"{where}: {_without_mesh(parts, where)}")
     if len(meshes) > 1:
         called = [part.get("name") or f"a {part.tag} without a name" for part, _ in meshes]
         raise ConfigError(
@@ -94,14 +94,40 @@ def _only_mesh(
     return meshes[0]
 
 
-def _without_mesh(parts: list[ElementTree.Element]) -> str:
-    shapes = [shape.tag for part in parts for shape in part.findall("geometry/*")]
+def _without_mesh(parts: list[ElementTree.Element], where: str) -> str:
+    """Return what is wrong with a link without a mesh, and how to make one of its primitive."""
+    shapes = [shape for part in parts for shape in part.findall("geometry/*")]
     if not shapes:
         return "it has no mesh; give it a <visual> with the mesh that the skin covers"
+    shape = shapes[0]
+    if shape.tag == "cylinder":
+        radius, length = _millimetres(shape, "radius", where), _millimetres(shape, "length", where)
+        make = f"make tube --radius-mm {radius:g} --length-mm {length:g} -o skin.obj"
+        what = "its side, with an opening for the rim"
+    elif shape.tag == "sphere":
+        make = f"make dome --radius-mm {_millimetres(shape, 'radius', where):g} -o skin.obj"
+        what = "half of it"
+    elif shape.tag == "box":
+        return (
+            "its geometry is a box, whose faces are flat: describe a flat skin, without surface,"
+            " and place it in the link by xyz_m and rpy_rad of a robot file"
+        )
+    else:
+        return f"its geometry is a {shape.tag}, not a mesh; give it a <visual> with a mesh"
     return (
-        f"its geometry is a {shapes[0]}, not a mesh; a skin covers a mesh with a rim, so give the"
-        " link a <visual> with one ( eitskin surface make  writes examples)"
+        f"its geometry is a {shape.tag}, which has no rim;  eitskin surface {make}  writes {what};"
+        ' add a <visual name="skin"> with the same <origin> and <mesh filename="skin.obj"'
+        ' scale="0.001 0.001 0.001"/>'
     )
+
+
+def _millimetres(shape: ElementTree.Element, name: str, where: str) -> float:
+    """Return an attribute in metres of a primitive, in mm."""
+    text = attribute(shape, name, where)
+    try:
+        return 1e3 * plain_number(text)
+    except ValueError:
+        raise ConfigError(f"{where}: its {shape.tag} has {name}={text!r}; write a number") from None
 
 
 def _file(name: str, folder: Path, where: str) -> Path:

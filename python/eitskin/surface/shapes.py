@@ -1,7 +1,7 @@
 """Surfaces made by formulas, for examples and studies: each is a disk in the sense of topology."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -12,19 +12,37 @@ from eitskin.config import nearest
 from eitskin.errors import UsageError
 from eitskin.fileio import write_bytes
 
-Place = Callable[[FloatArray, FloatArray], FloatArray]
+Place = Callable[..., FloatArray]
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A surface by formula: ``place`` takes u and v (k,) from -1 to 1 to points (k, 3) in mm.
-    ``round`` shapes use the disk u^2 + v^2 <= 1, the others the whole square. ``size_mm`` is about
-    the width of the surface."""
+    """A surface by formula: ``place`` takes u and v (k,) from -1 to 1, and ``measures`` by their
+    names, to points (k, 3) in mm. ``round`` shapes use the disk u^2 + v^2 <= 1, the others the
+    whole square. ``measures`` holds the default values of those that a caller may choose, which
+    must lie within ``MEASURES``."""
 
     place: Place
     round: bool
-    size_mm: float
     what: str
+    measures: Mapping[str, float] = field(default_factory=dict)
+
+
+MEASURES = {"radius_mm": (1.0, 2000.0), "length_mm": (1.0, 5000.0), "angle_deg": (10.0, 350.0)}
+
+
+def _tube(
+    u: FloatArray, v: FloatArray, radius_mm: float, length_mm: float, angle_deg: float
+) -> FloatArray:
+    turn = u * np.radians(angle_deg / 2)
+    return np.column_stack([radius_mm * np.cos(turn), radius_mm * np.sin(turn), v * length_mm / 2])
+
+
+def _dome(u: FloatArray, v: FloatArray, radius_mm: float, angle_deg: float) -> FloatArray:
+    polar, turn = np.hypot(u, v) * np.radians(angle_deg / 2), np.arctan2(v, u)
+    return radius_mm * np.column_stack(
+        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)]
+    )
 
 
 def _cylinder(u: FloatArray, v: FloatArray) -> FloatArray:
@@ -39,14 +57,6 @@ def _cone(u: FloatArray, v: FloatArray) -> FloatArray:
     along, angle = np.hypot(220.0 + 97.0 * v, 97.0 * u), np.arctan2(97.0 * u, 220.0 + 97.0 * v)
     turn, radius = angle / np.sin(half), along * np.sin(half)
     return np.column_stack([radius * np.sin(turn), along * np.cos(half), radius * np.cos(turn)])
-
-
-def _hemisphere(u: FloatArray, v: FloatArray) -> FloatArray:
-    rho, turn = np.hypot(u, v), np.arctan2(v, u)
-    polar = rho * np.pi / 2
-    return 60.0 * np.column_stack(
-        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)]
-    )
 
 
 def _saddle(u: FloatArray, v: FloatArray) -> FloatArray:
@@ -96,32 +106,52 @@ def flexed_forearm(triangles: int, bulge_mm: float) -> tuple[FloatArray, IntArra
 
 
 SHAPES = {
-    "cylinder": Shape(_cylinder, True, 194.0, "a disk of 194 mm around a cylinder of radius 60 mm"),
-    "cone": Shape(_cone, True, 194.0, "a disk of 194 mm on a cone with a half angle of 20 degrees"),
-    "hemisphere": Shape(_hemisphere, True, 190.0, "half a ball of radius 60 mm"),
-    "saddle": Shape(_saddle, True, 160.0, "a saddle, 160 mm across"),
-    "fingertip": Shape(_fingertip, False, 28.0, "the pad of a finger, 28 by 28 mm"),
-    "forearm": Shape(_forearm, False, 210.0, "a sleeve around a forearm, 200 mm long"),
+    "cylinder": Shape(_cylinder, True, "a disk of 194 mm around a cylinder of radius 60 mm"),
+    "cone": Shape(_cone, True, "a disk of 194 mm on a cone with a half angle of 20 degrees"),
+    "hemisphere": Shape(
+        partial(_dome, radius_mm=60.0, angle_deg=180.0), True, "half a ball of radius 60 mm"
+    ),
+    "saddle": Shape(_saddle, True, "a saddle, 160 mm across"),
+    "fingertip": Shape(_fingertip, False, "the pad of a finger, 28 by 28 mm"),
+    "forearm": Shape(_forearm, False, "a sleeve around a forearm, 200 mm long"),
     "flexed_forearm": Shape(
-        partial(_forearm, bulge_mm=12.0), False, 210.0, "the same forearm with a muscle that bulges"
+        partial(_forearm, bulge_mm=12.0), False, "the same forearm with a muscle that bulges"
+    ),
+    "tube": Shape(
+        _tube,
+        False,
+        "the side of a cylinder around the axis z, open towards -x",
+        {"radius_mm": 40.0, "length_mm": 200.0, "angle_deg": 300.0},
+    ),
+    "dome": Shape(
+        _dome, True, "the cap of a ball around the axis z", {"radius_mm": 40.0, "angle_deg": 180.0}
     ),
 }
 
 
-def make_shape(name: str, triangles: int = 4000) -> tuple[FloatArray, IntArray]:
+def make_shape(name: str, triangles: int = 4000, **measures: float) -> tuple[FloatArray, IntArray]:
     """Return the points (N, 3) in mm and the triangles (T, 3) of the surface ``name``, about
-    ``triangles`` of them, counterclockwise seen from outside.
+    ``triangles`` of them, counterclockwise seen from outside. ``measures`` replace the shape's.
 
     Raises:
-        UsageError: no shape has this name, or ``triangles`` is not within 50 to 2,000,000.
+        UsageError: no shape has this name, or it has no such measure; a number is out of range.
     """
     if name not in SHAPES:
         raise UsageError(f"surface {name!r}: {nearest(name, list(SHAPES))}")
     if not 50 <= triangles <= 2_000_000:
         raise UsageError(f"surface: {triangles} triangles is out of range; use 50 to 2000000")
     shape = SHAPES[name]
+    for measure, value in measures.items():
+        if measure not in shape.measures:
+            own = ", ".join(shape.measures) or "none"
+            raise UsageError(f"surface {name!r} has no {measure}; measures of it: {own}")
+        low, high = MEASURES[measure]
+        if not low <= value <= high:
+            raise UsageError(
+                f"surface: {measure} {value:g} is out of range; use {low:g} to {high:g}"
+            )
     flat, faces = disk_net(triangles) if shape.round else square_net(triangles)
-    return shape.place(*flat.T), faces
+    return shape.place(*flat.T, **{**shape.measures, **measures}), faces
 
 
 def disk_net(triangles: int) -> tuple[FloatArray, IntArray]:

@@ -27,6 +27,22 @@ def test_a_skin_on_a_surface_is_described_and_drawn(arm, tmp_path, capsys):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("dome --length-mm 50", "'dome' has no length_mm; measures of it: radius_mm, angle_deg"),
+        ("saddle --radius-mm 50", "'saddle' has no radius_mm; measures of it: none"),
+        ("tube --angle-deg 360", "angle_deg 360 is out of range; use 10 to 350"),
+        ("tube --radius-mm nan", "radius_mm nan is out of range"),
+    ],
+)
+def test_measures_that_a_shape_does_not_have_are_refused(tmp_path, capsys, options, message):
+    mesh = tmp_path / "mesh.obj"
+    assert main(["surface", "make", *options.split(), "-o", str(mesh)]) != 0
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1 and not mesh.exists()
+
+
 def test_a_model_of_a_surface_is_built(arm, tmp_path, capsys):
     model = tmp_path / "arm.eitm"
     assert main(["model", "build", str(arm), "-o", str(model), "--samples", "0"]) == 0

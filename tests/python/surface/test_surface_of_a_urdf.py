@@ -1,10 +1,13 @@
 """A skin on the mesh of a URDF's link: in the link's frame, and what is wrong with it in a line."""
 
+import re
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from eitskin.cli.main import main
 from eitskin.errors import EitskinError
 from eitskin.kinematics.link_mesh import link_mesh
 from eitskin.skin.skin import Skin, load_skin
@@ -40,6 +43,39 @@ def test_a_mesh_comes_into_the_links_frame(tmp_path):
     wanted = np.column_stack([-y, x, z + 0.1])
     found = points_m(read(tmp_path))
     np.testing.assert_allclose(np.sort(found, axis=0), np.sort(wanted, axis=0), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("primitive", "area_mm2"),
+    [
+        ('<cylinder radius="0.04" length="0.2"/>', 40 * np.radians(300) * 200),
+        ('<sphere radius="0.05"/>', 2 * np.pi * 50**2),
+    ],
+)
+def test_the_message_about_a_primitive_says_what_makes_a_skin_of_it(
+    tmp_path, monkeypatch, primitive, area_mm2
+):
+    """Its command is run, and its <visual> written, word by word. The mesh is where the primitive
+    is."""
+    monkeypatch.chdir(tmp_path)
+    origin = '<origin xyz="0 0 0.1" rpy="0 1.5707963267948966 0"/>'
+    body = f"<visual>{origin}<geometry>{primitive}</geometry></visual>"
+    urdf(tmp_path, body)
+    with pytest.raises(EitskinError, match="which has no rim") as caught:
+        read(tmp_path)
+    command = re.search(r"eitskin (surface make .*? -o skin.obj)", str(caught.value))
+    mesh = re.search(r"<mesh .*?/>", str(caught.value))
+    assert command is not None and mesh is not None
+    assert main(shlex.split(command[1])) == 0
+    skin = f'<visual name="skin">{origin}<geometry>{mesh[0]}</geometry></visual>'
+    urdf(tmp_path, body + skin)
+    surface = read(tmp_path).surface
+    assert surface is not None and surface.area_mm2 == pytest.approx(area_mm2, rel=5e-3)
+    local_m = surface.points_m() - [0, 0, 0.1]  # its axis z lies along x of the link
+    radius_m = float(re.findall(r'radius="(.*?)"', primitive)[0])
+    from_axis = local_m[:, 1:] if "cylinder" in primitive else local_m
+    np.testing.assert_allclose(np.linalg.norm(from_axis, axis=1), radius_m, rtol=1e-5)
+    assert surface.scale_range[1] < (1.01 if "cylinder" in primitive else 2.01)
 
 
 def test_a_mirrored_mesh_faces_the_same_side(tmp_path):
@@ -102,8 +138,18 @@ def test_packages_are_searched_around_the_urdf_and_where_ros_looks(tmp_path, mon
         ("arm.urdf#forearm", MESH + MESH, "2 meshes can be meant .a visual without a name, a"),
         (
             "arm.urdf#forearm",
-            '<visual><geometry><cylinder radius="1" length="1"/></geometry></visual>',
-            "is a cylinder, not a mesh",
+            '<visual><geometry><box size="1 1 1"/></geometry></visual>',
+            "is a box, whose faces are flat: describe a flat skin",
+        ),
+        (
+            "arm.urdf#forearm",
+            '<visual><geometry><capsule radius="1"/></geometry></visual>',
+            "is a capsule, not a mesh",
+        ),
+        (
+            "arm.urdf#forearm",
+            '<visual><geometry><sphere radius="1 m"/></geometry></visual>',
+            "its sphere has radius='1 m'; write a number",
         ),
         ("arm.urdf#forearm", MESH.replace("filename", "file"), "<mesh> has no filename"),
         ("arm.urdf#forearm", MESH.replace("arm.obj", "no.obj"), "forearm.*no such mesh file"),
