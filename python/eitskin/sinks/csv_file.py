@@ -24,7 +24,15 @@ DRIVE = (
     "vy_mm_per_s",
     "confirmed",
 )  # empty in the lines of frames
-COLUMNS = (*HEAD, *TOUCH, "found", "refused", "events", *DRIVE, "source")
+PLACE = {
+    "position_m": ("position_x_m", "position_y_m", "position_z_m"),
+    "normal": ("normal_x", "normal_y", "normal_z"),
+}  # in the frame ``link``; empty for a flat skin that no robot file places
+COLUMNS = (
+    *(*HEAD, *TOUCH, "found", "refused", "events", *DRIVE, "source", "link"),
+    *PLACE["position_m"],
+    *PLACE["normal"],
+)
 
 
 class CsvSink:
@@ -37,17 +45,25 @@ class CsvSink:
         message = outgoing.message
         if message["type"] not in ("frame", "report"):
             return
-        shared = {name: message.get(name) for name in (*HEAD, "drive", "refused", "source")}
+        shared = {name: message.get(name) for name in (*HEAD, "drive", "refused", "source", "link")}
         if message["type"] == "frame":
             shared["found"] = "; ".join(message["found"])
             shared["events"] = " ".join(event["kind"] for event in message["events"])
-        lines = [shared | touch for touch in message["touches"] or [{}]]
+        lines = [shared | _with_place(touch) for touch in message["touches"] or [{}]]
         self._file.write(_text([[line.get(name) for name in COLUMNS] for line in lines]))
         self._file.sync_now_and_then()
         self._file.check()
 
     def close(self) -> None:
         self._file.close()
+
+
+def _with_place(touch: dict[str, Any]) -> dict[str, Any]:
+    """Return ``touch`` with its place in the link's frame in a cell per number."""
+    place: dict[str, float] = {}
+    for name, columns in PLACE.items():
+        place |= dict(zip(columns, touch.get(name, ()), strict=False))
+    return touch | place
 
 
 def _text(rows: list[Any]) -> bytes:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from eitskin.arrays import FloatArray
-from eitskin.errors import FileError, GeometryError
+from eitskin.errors import ConfigError, FileError, GeometryError
 from eitskin.kinematics.link_mesh import LinkMesh, link_mesh
 from eitskin.surface.surface_map import SurfaceMap
 
@@ -21,11 +21,16 @@ class CoveredSurface:
     file_points_mm: FloatArray
 
     def vertices_mm(self, numbers: Sequence[float], where: str) -> list[list[float]]:
-        """Return the points of vertices by their ``numbers`` in the file, from 0."""
+        """Return the points of vertices by their ``numbers`` in the file, from 0; ``where`` names
+        the table with the numbers in errors.
+
+        Raises:
+            ConfigError: the file has no such vertex.
+        """
         count = len(self.file_points_mm)
         for number in numbers:
             if number != int(number) or not 0 <= number < count:
-                raise GeometryError(
+                raise ConfigError(
                     f"{where}: vertex {number:g} is not one of the mesh file's 0 to {count - 1}"
                 )
         points: list[list[float]] = self.file_points_mm[[int(n) for n in numbers]].tolist()

@@ -62,7 +62,8 @@ def test_each_skin_has_its_topics_links_and_source(tmp_path, capsys):
     for name in LINKS:
         assert sum(f"/eitskin/{name}/frame".encode() in one for one in bundles) == 5
     with (tmp_path / "a.csv").open() as stream:
-        assert {row["source"] for row in csv.DictReader(stream)} == set(LINKS)
+        rows = list(csv.DictReader(stream))
+    assert {(row["source"], row["link"]) for row in rows} == set(LINKS.items())
     with (tmp_path / "a.mcap").open("rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         made = {
@@ -78,6 +79,11 @@ def test_each_skin_has_its_topics_links_and_source(tmp_path, capsys):
     contacts = [m for (topic, *_), m in made.items() if topic == "/forearm/contacts"]
     found = [one for m in contacts for one in m.contacts]
     touch = last["touches"][0]
+    (row,) = (row for row in rows if (row["frame"], row["source"], row["id"])
+              == (str(last["frame"]), "forearm", str(touch["id"])))  # fmt: skip
+    for name, unit in (("position", "_m"), ("normal", "")):
+        cells = [float(row[f"{name}_{axis}{unit}"]) for axis in "xyz"]
+        assert cells == touch[f"{name}{unit}"]
     (same,) = [one for one in found if [one.position.x, one.position.y, one.position.z]
                == touch["position_m"]]  # fmt: skip
     assert same.id == touch["id"] and same.normal.x == pytest.approx(1)
