@@ -248,6 +248,13 @@
  * a touch; smaller: late */
 #define EITS_FAST_SEED_REACH_MM R(8.0)
 
+/* end of a disc from which on it is a palm [mm]. between FAST_RHO_WIDE_MM and FAST_RHO_WIDER_MM */
+#define EITS_FAST_PALM_MM R(25.0)
+
+/* below which a frame's touch is what the solver's discs leave of the palm [of a palm's strength].
+ * larger: a light finger beside a palm is missed; smaller: touches at its rim */
+#define EITS_FAST_PALM_REST R(0.1)
+
 /* ---- Chosen: on tuning streams, whose seed and runs were not kept, for a whole-frame tracker that
  * smoothed places as well. Check: eitskin study hands */
 

@@ -238,6 +238,27 @@ static inline eits_real fast_room_mm(const eits_fast *fast, uint32_t k)
            EITS_FAST_APART_WIDE * (eits_sqrt(fast->known[k].rho2) - eits_sqrt(fast->rho2));
 }
 
+/* Whether a touch is as wide as a palm. The solver takes it for several discs, so that frames tell
+ * neither where it is nor how strong. */
+static inline int fast_is_palm(eits_real rho2)
+{
+    return rho2 > fast_square(EITS_FAST_PALM_MM);
+}
+
+/* Whether a frame's touch, at a place of the model, is what the solver makes of a palm: it lies on
+ * it, or is much fainter. */
+static inline int fast_is_rest(const eits_fast *fast, const eits_real *place, eits_real strength)
+{
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        const eits_real *palm = fast->state + FAST_SIZE * k;
+        if (fast_is_palm(fast->known[k].rho2) &&
+            (eits_fabs(strength) < EITS_FAST_PALM_REST * palm[FAST_C] ||
+             fast_distance2(place, palm) < fast_square(fast_room_mm(fast, k))))
+            return 1;
+    }
+    return 0;
+}
+
 /* ---- rows.c ---- */
 
 /* The pixels of a touch's soft disc, which ends at the root of `rho2`; 0 where none is kept. */

@@ -221,7 +221,7 @@ static void seed(eits_fast *fast, const eits_touch *found, const eits_real (*at)
         const eits_real c = fast->sign * found[n].strength_s_per_m_mm2;
         eits_real none[FAST_SIZE][FAST_SIZE] = {{0}};
         const eits_real state[FAST_SIZE] = {at[n][0], at[n][1], c, 0, 0};
-        if (owner[n] != FAST_NONE || !(c > 0))
+        if (owner[n] != FAST_NONE || !(c > 0) || fast_is_rest(fast, at[n], c))
             continue;
         /* Two frames on end: in a single one, a touch that landed while it was scanned may stand at
          * a wrong place. */
@@ -281,7 +281,7 @@ static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_re
                       : FAST_ELSEWHERE;
     if (known->last == FAST_AGREED)
         known->confirmed = 1;
-    else if (again && !(known->moving && fast->frame_explained))
+    else if (again && !(known->moving && fast->frame_explained) && !fast_is_palm(known->rho2))
         put(fast, k, known->place, place, c);
     eits_copy(known->place, place, 2);
     known->place_us = fast->aligned_us;

@@ -14,6 +14,8 @@
  * decides which touch is which: what is reported lies where the solver found it. */
 #include "fast/fast.h"
 
+#include "context/places.h"
+
 #include "eitskin/force.h"
 
 enum { NONE = EITS_MAX_TOUCHES };
@@ -282,7 +284,9 @@ eits_status eits_fast_report(eits_fast *fast, const eits_touch *found, uint32_t 
     *count = report_followed(fast, found, n_found, taken, touches);
     if (found != NULL) {
         for (uint32_t n = 0; n < n_found; ++n) {
-            if (!taken[n])
+            eits_real at[2] = {found[n].x_mm, found[n].y_mm};
+            eits_place_in_model(fast->ctx, at);
+            if (!taken[n] && !fast_is_rest(fast, at, found[n].strength_s_per_m_mm2))
                 rest[n_rest++] = found[n];
         }
         follow(fast, rest, n_rest, drives);

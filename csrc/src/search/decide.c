@@ -220,7 +220,7 @@ int eits_decide(eits_fast *fast)
     trial[FAST_MOVE].cost =
         trial[FAST_MOVE].left + trial[FAST_MOVE].change + 4 * (eits_real)trial[FAST_MOVE].bodies;
     if (trial[FAST_REPLACE].exists)
-        trial[FAST_REPLACE].cost += 2 * drives + 6;
+        trial[FAST_REPLACE].cost += 6 + (fast_is_palm(trial[FAST_REPLACE].rho2) ? 0 : 2 * drives);
     eits_real least;
     const fast_which birth = best_birth(fast, &least);
     const eits_real move = cost_of(fast, FAST_MOVE), replace = cost_of(fast, FAST_REPLACE);

@@ -102,6 +102,19 @@ static void look_at_moves(eits_fast *fast)
     eits_trial_refine(fast, trial, 2);
 }
 
+/* A finger moves at most at EITS_FAST_SPEED_MOST; a faster one is something else. */
+static void end_moves(eits_fast *fast)
+{
+    fast_trial *trial = search_trial(fast, FAST_MOVE);
+    for (uint32_t i = 0; trial->exists && i < trial->bodies; ++i) {
+        const eits_real *by = trial->body[i].p + 2;
+        const eits_real *speed = fast->state + FAST_SIZE * trial->body[i].known + FAST_VX;
+        const eits_real x = speed[0] + by[0], y = speed[1] + by[1];
+        if (!(x * x + y * y < fast_square(EITS_FAST_SPEED_MOST)))
+            trial->exists = 0;
+    }
+}
+
 /* ---- a known one is elsewhere, faster or wider ---- */
 
 static uint32_t cost_of_replace(const eits_fast *fast)
@@ -208,10 +221,15 @@ static void end_swerve(eits_fast *fast)
 static uint32_t cost_of_wider(const eits_fast *fast)
 {
     uint32_t k;
-    return fast->search.count > 4 && search_one(fast)->exists && !eits_search_clear(fast) &&
-                   eits_search_near(fast, &k) && fast->known[k].age < EITS_FAST_WIDENS
+    return fast->search.count > 2 && search_one(fast)->exists && eits_search_near(fast, &k) &&
+                   fast->known[k].age < EITS_FAST_WIDENS
                ? fast->search.count
                : 0;
+}
+
+static uint32_t cost_of_wide(const eits_fast *fast)
+{
+    return eits_search_clear(fast) ? 0 : cost_of_wider(fast);
 }
 
 static void try_wider(eits_fast *fast, eits_real rho)
@@ -227,15 +245,17 @@ static void try_wide(eits_fast *fast)
     try_wider(fast, EITS_FAST_RHO_WIDE_MM);
 }
 
+/* A palm that lands grows at one side first, which a finger that moves explains as well: this width
+ * is looked for even if a move is clear. */
 static void try_widest(eits_fast *fast)
 {
     try_wider(fast, EITS_FAST_RHO_WIDER_MM);
 }
 
-const search_piece eits_piece_move = {cost_of_move, look_at_moves, NULL};
+const search_piece eits_piece_move = {cost_of_move, look_at_moves, end_moves};
 const search_piece eits_pieces_change[4] = {
     {cost_of_replace, look_for_place, end_instead},
     {cost_of_swerve, look_for_swerve, end_swerve},
-    {cost_of_wider, try_wide, end_instead},
+    {cost_of_wide, try_wide, end_instead},
     {cost_of_wider, try_widest, end_instead},
 };

@@ -43,6 +43,7 @@ snr_db = 60.0
 spread = 0.2
 """
 SETTINGS = SessionSettings(mode=Stream.RAW | Stream.TOUCHES, report="drive", tare=16)
+PALM = replace(SETTINGS, mode=Stream.TOUCHES, tare=64)
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +82,32 @@ def test_they_are_told_soon_where_they_are_and_how_fast(recorded):
     frames = [item for item in recorded[1] if isinstance(item, Frame)]
     assert not any(frame.diagnostics for frame in frames if frame.touches)  # its lift may name one
     assert any(len(frame.touches) == 1 for frame in frames)
+
+
+@pytest.mark.parametrize(("x_mm", "y_mm"), [(37.48, -10.13), (-27.9, 14.6)])
+def test_a_palm_that_lands_slowly_does_not_run_away(tmp_path, x_mm, y_mm):
+    place = f"x_mm = {x_mm}, y_mm = {y_mm}"
+    path = tmp_path / "palm.toml"
+    path.write_text(
+        f"""[scene]
+name = "palm"
+seed = 1
+rate_hz = 48.0
+frames = 9
+quiet_frames = 64
+elements = 3500
+[[touch]]
+radius_mm = 22.0
+contrast = 2.0
+path = [{{t_s = 0.0125, {place}, press = 0.0}}, {{t_s = 0.1325, {place}, press = 1.0}}]
+[effects.noise]
+snr_db = 60.0
+""",
+        encoding="utf-8",
+    )
+    touches = [one for item in followed(f"sim:{path}", PALM) for one in item.touches]
+    assert len(touches) > 80
+    assert max(np.hypot(one.x_mm - x_mm, one.y_mm - y_mm) for one in touches) < 12
 
 
 def test_their_messages_keep_to_the_schema(recorded):
