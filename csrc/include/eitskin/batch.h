@@ -13,11 +13,12 @@
 extern "C" {
 #endif
 
-/* One frame's result. Ids number its touches, since none is followed. */
+/* One frame's result. Ids number the touches of this frame alone, since touches are not tracked. */
 typedef struct eits_result {
-    /* of eits_reconstruct; if it is not EITS_OK, there are no touches and the image is zero */
+    /* status of eits_reconstruct; if it is not EITS_OK, there are no touches and the image is zero
+     */
     eits_status status;
-    uint32_t count; /* of touches; 0 if `touches` was NULL */
+    uint32_t count; /* number of touches; 0 if `touches` was NULL */
     eits_info info;
 } eits_result;
 

@@ -33,17 +33,19 @@
 extern "C" {
 #endif
 
-/* The reference and its noise, as eits_get_reference reports them. frame.h takes a reference. */
+/* The reference and its noise, as eits_get_reference reports them. The functions of frame.h take a
+ * reference. */
 typedef struct eits_reference_info {
-    /* n_rows: mean of the reference frames, V; NaN for a row that was masked in any of them. It
-     * lies in the context and changes with the next reference */
+    /* n_rows numbers: mean of the reference frames, V; NaN for a row that was masked in any of
+     * them. They lie in the context and change with the next reference */
     const eits_real *v0;
-    uint32_t count;   /* reference frames that are in v0 */
-    uint32_t ready;   /* 1: frames can be measured against it; 0: there is none, or not yet */
+    uint32_t count;   /* number of reference frames whose mean is v0 */
+    uint32_t ready;   /* 1: frames can be compared with it; 0: there is no complete reference */
     eits_real v0_rms; /* rms of v0 over the rows in use, V */
     /* model volts per measured volt: rms(v_ref) / rms(v0), with the sign of `correlation` */
     eits_real gain;
-    /* of v0 with v_ref on the folded rows: near 1 if skin, row order and sign are right */
+    /* correlation of v0 with v_ref on the folded rows: near 1 if skin, row order and sign are right
+     */
     eits_real correlation;
     eits_real noise_v; /* rms over rows of the reference frames' deviation, V; 0 if unknown */
     /* the greatest max(S'y) of a reference frame, for all rows in use; 0 if unknown */

@@ -2,10 +2,10 @@
  *
  * The frame stage examines rows and electrodes before anything is solved, and leaves out those that
  * would spoil the image; solver and touch fit examine the result. A diagnostic is not an error: the
- * core makes an image of the rest of the frame. It rejects a frame only if more rows than
- * options.max_masked are left out; the diagnostics are reported all the same. options.diagnostics
- * chooses the diagnostics; saturated rows are left out in any case. docs/reference/diagnostics.md
- * has the rule of each.
+ * core makes an image of the rest of the frame. It rejects a frame only if more than
+ * options.max_masked rows are left out, and then still reports the diagnostics. options.diagnostics
+ * chooses which diagnostics are examined; saturated rows are left out in any case.
+ * docs/reference/diagnostics.md has the rule of each.
  *
  * Written by tables/make_tables.py from tables/diagnostics.toml.
  */
@@ -46,17 +46,19 @@ typedef enum eits_diagnostic {
 
 /* Bits: why a row is left out of a frame; 0 for a row in use. */
 typedef enum eits_row_state {
-    /* by eits_mask_row, or while the reference was taken */
+    /* masked by eits_mask_row, or left out while the reference was taken */
     EITS_ROW_MASKED = 1,
-    /* not a finite number */
+    /* its voltage is not a finite number */
     EITS_ROW_UNKNOWN = 2,
+    /* it is at or beyond options.saturation_v */
     EITS_ROW_SATURATED = 4,
-    /* uses an open electrode */
+    /* it uses an open electrode */
     EITS_ROW_OPEN = 8,
-    /* uses an electrode of a bridged pair */
+    /* it uses an electrode of a bridged pair */
     EITS_ROW_BRIDGED = 16,
+    /* it disagrees with all other rows */
     EITS_ROW_OUTLIER = 32,
-    /* uses a noisy electrode */
+    /* it uses a noisy electrode */
     EITS_ROW_NOISY = 64
 } eits_row_state;
 
@@ -86,40 +88,43 @@ typedef enum eits_stop {
     EITS_STOP_DIVERGED = 4,
     /* the next step would have exceeded mac_limit: the image is the best one so far */
     EITS_STOP_MACS = 5,
-    /* no coefficient moves any more except by rounding; of the active set alone */
+    /* no coefficient moves any more except by rounding; only the active-set solver reports this */
     EITS_STOP_OPTIMUM = 6
 } eits_stop;
 
 /* Which image shows a frame. */
 typedef enum eits_shown {
-    /* the solver's (eits_get_image): there are no touches, or they do not explain the frame */
+    /* the solver's image (eits_get_image): there are no touches, or they do not explain the
+     * frame */
     EITS_SHOWN_SOLVER = 0,
-    /* the one that eits_draw_touches makes of the touches: they explain the frame */
+    /* the image that eits_draw_touches draws of the touches, which explain the frame */
     EITS_SHOWN_TOUCHES = 1
 } eits_shown;
 
 /* The cost of a reconstruction, how it ended, and what was wrong with the frame. */
 typedef struct eits_info {
-    /* of the solver */
+    /* iterations of the solver */
     uint32_t iterations;
+    /* why the solver stopped */
     eits_stop stop;
     /* coefficients that are not zero */
     uint32_t nonzeros;
     /* rows of the protocol that were left out of this frame */
     uint32_t masked;
+    /* how often the solver halved its step because the objective rose */
     uint32_t step_halvings;
-    /* set by eits_find_touches */
+    /* number of touches; set by eits_find_touches */
     uint32_t touches;
     /* multiply-accumulates with a stored matrix, a basis vector, F or the active set's factor;
      * vector sums are not counted */
     uint64_t macs;
     /* the same for eits_find_touches */
     uint64_t touch_macs;
-    /* as used */
+    /* lambda as used */
     eits_real lambda;
     /* the smallest lambda whose image is zero: max(S'y), by the option sign */
     eits_real lambda_max;
-    /* the reference's, times a factor for the rows that are left out */
+    /* the reference's lambda_noise, times a factor for the rows that are left out */
     eits_real lambda_noise;
     /* duality gap at the result, absolute; 0 if stop is BELOW_THRESHOLD, ZERO or DIVERGED, or if it
      * is MACS and not even one product with S was affordable */
@@ -132,21 +137,21 @@ typedef struct eits_info {
     eits_real data_norm;
     /* bits of eits_diagnostic; CROWDED is set by eits_find_touches */
     uint32_t diagnostics;
-    /* saturated rows, without masked ones */
+    /* saturated rows, masked ones not counted */
     uint32_t saturated;
     /* rows left out as outliers */
     uint32_t outliers;
     /* fraction of |d| above noise that lies outside the model's range, 0 to 1; 0 if it was not
      * examined */
     eits_real model_mismatch;
-    /* fraction of |y|^2 that the touches do not explain, or of |d|^2 where they were fitted
-     * jointly; set by eits_find_touches; 0 if no touches were looked for */
+    /* fraction of |y|^2 that the touches do not explain, or of |d|^2 if they were fitted jointly;
+     * set by eits_find_touches; 0 if no touches were looked for */
     eits_real unexplained;
-    /* bit e: electrode e, of the first 64; eits_get_electrode_states has all */
+    /* bit e: electrode e is open, for the first 64; eits_get_electrode_states has all */
     uint64_t open_electrodes;
-    /* bit e: electrode e, of one or more pairs */
+    /* bit e: electrode e is bridged with another one */
     uint64_t bridged_electrodes;
-    /* bit e: electrode e */
+    /* bit e: electrode e is noisy */
     uint64_t noisy_electrodes;
     /* regularisation of the whitening of this frame, over s_1^2; 0 if the model does not state
      * it */
@@ -157,16 +162,17 @@ typedef struct eits_info {
 
 /* One touch. */
 typedef struct eits_touch {
-    /* counts up from 1; a touch keeps it from frame to frame */
+    /* number from 1 that a touch keeps from frame to frame */
     uint32_t id;
-    /* the centre */
+    /* centre of the touch */
     eits_real x_mm;
     eits_real y_mm;
+    /* radius of the fitted disc, or of a disc with the ellipse's area */
     eits_real radius_mm;
     /* conductivity change integrated over the touch: S mm^2/m */
     eits_real strength_s_per_m_mm2;
     /* fraction of |y|^2 that would be unexplained without this touch, 0 to 1; 0 if it was not found
-     * in this frame and is held */
+     * in this frame and is held from earlier ones */
     eits_real explained;
     /* its force, N; 0 if the model is not calibrated (force.h) */
     eits_real force_n;
@@ -182,11 +188,12 @@ typedef struct eits_touch {
      * disc, or the data do not show a shape */
     eits_real long_x_mm;
     eits_real long_y_mm;
-    /* standard deviation of radius_mm; 0 if the data do not tell the radius. Then radius_mm is the
-     * one expected of touches of this strength, and the change of conductivity, the strength over
-     * the area, is not known either */
+    /* standard deviation of radius_mm; 0 if the data do not determine the radius. Then radius_mm is
+     * the one expected of touches of this strength, and the change of conductivity, which is the
+     * strength over the area, is not known either */
     eits_real radius_sd_mm;
-    /* 0: drives alone have shown it, or the first frame of frames alone (eits_fast_report) */
+    /* 1: a whole frame has shown it; 0: so far only drives have, or a single frame
+     * (eits_fast_report) */
     uint32_t confirmed;
 } eits_touch;
 

@@ -15,11 +15,12 @@
 extern "C" {
 #endif
 
-/* Bytes of a head, and of the longest packet before it is stuffed, for a decoder's buffer. */
+/* Bytes of a head; and of the longest packet before COBS stuffing, which a decoder's buffer must
+ * hold. */
 #define EITS_LINK_HEAD       8u
 #define EITS_LINK_MAX_PACKET (EITS_LINK_HEAD + EITS_LINK_MAX_PAYLOAD + 4u)
-/* The maximum of bytes on the wire for a payload of `size` bytes: COBS adds one byte in 254, and
- * the two zeros come on top. */
+/* The maximum number of bytes on the wire for a payload of `size` bytes: COBS adds at most one byte
+ * per 254, and a zero stands at either end. */
 #define EITS_LINK_ENCODED(size) \
     ((size_t)(size) + EITS_LINK_HEAD + 4u + ((size_t)(size) + EITS_LINK_HEAD + 4u) / 254u + 3u)
 
@@ -33,7 +34,7 @@ size_t eits_link_encode(uint8_t *out, size_t room, uint8_t type, uint32_t sequen
  */
 typedef struct eits_link_packet {
     uint8_t type;      /* eits_packet_type, or a number that this version does not know */
-    uint32_t sequence; /* counts what the other side sent or dropped, modulo 2^32 */
+    uint32_t sequence; /* counts the packets that the other side sent or dropped, modulo 2^32 */
     /* inside the decoder's buffer, 4-byte aligned, until the next eits_link_feed */
     const uint8_t *payload;
     size_t size; /* bytes of payload */
@@ -45,11 +46,11 @@ typedef struct eits_link_decoder {
     size_t room, used; /* bytes of the buffer, and those of the packet so far */
     /* the COBS block's missing bytes and code; 1 if a packet has begun; 1 if it is too long */
     uint8_t left, code, in_packet, broken;
-    uint32_t packets;        /* accepted */
-    uint32_t crc_errors;     /* whole COBS frames whose checksum does not fit */
-    uint32_t framing_errors; /* ended inside a COBS block, or shorter than head and checksum */
-    uint32_t overruns;       /* longer than the buffer */
-    uint32_t version_errors; /* checksum fits, but of another protocol version */
+    uint32_t packets;        /* packets that were accepted */
+    uint32_t crc_errors;     /* whole COBS frames with a wrong checksum */
+    uint32_t framing_errors; /* those that end in a COBS block, or too short for head and CRC */
+    uint32_t overruns;       /* those that are longer than the buffer */
+    uint32_t version_errors; /* packets with the right checksum of another protocol version */
     uint8_t other_version;   /* the last version that did not match */
 } eits_link_decoder;
 

@@ -21,15 +21,15 @@ extern "C" {
 typedef enum eits_sign {
     /* x >= 0: touches by something that conducts better */
     EITS_SIGN_INCREASE = 0,
-    /* x <= 0 */
+    /* x <= 0: touches by something that conducts worse */
     EITS_SIGN_DECREASE = 1,
-    /* all x */
+    /* any x: touches of both kinds */
     EITS_SIGN_BOTH = 2
 } eits_sign;
 
 /* The method that finds the image; all minimise the same objective (solve.h). */
 typedef enum eits_solver {
-    /* every column in every iteration */
+    /* FISTA on all columns in every iteration */
     EITS_SOLVER_FISTA = 0,
     /* FISTA on the columns that may differ from zero. They are chosen again after gap_every
      * iterations, then at growing intervals; with gap_rel > 0, always after gap_every */
@@ -60,20 +60,20 @@ typedef enum eits_touch_fit {
 /* The options. Lambdas are in the units of S'y. docs/reference/options.md lists default values and
  * ranges. */
 typedef struct eits_options {
-    /* the maximum number of iterations; FISTA runs exactly so many if gap_rel is 0 */
+    /* the maximum number of iterations; FISTA runs exactly this many if gap_rel is 0 */
     uint32_t iterations;
     /* iterations between checks of the duality gap and of divergence, and before the working set is
      * chosen again */
     uint32_t gap_every;
-    /* the maximum number of touches that are reported; by default the model's */
+    /* the maximum number of touches that are reported; the default is the model's */
     uint32_t max_touches;
     /* the core rejects a frame in which more rows cannot be used; by default half of the rows */
     uint32_t max_masked;
     /* the change that is looked for: increase (conducting touches), decrease or both */
     eits_sign sign;
-    /* fista, working-set or active-set (solve.h) */
+    /* the method: fista, working-set or active-set (solve.h) */
     eits_solver solver;
-    /* 1: start from the last frame's coefficients, momentum reset (solve.h) */
+    /* 1: start from the last frame's coefficients, with the momentum reset (solve.h) */
     uint32_t warm_start;
     /* 1: ignore changes along the reference frame, that is, drift of the gain; the default is 1, in
      * taught models 0 */
@@ -89,9 +89,9 @@ typedef struct eits_options {
     eits_real detection_factor;
     /* > 0: stop once the duality gap <= gap_rel |y|^2 / 2 */
     eits_real gap_rel;
-    /* > 0: a row at or beyond +-saturation_v, V, is left out; 0: none is */
+    /* > 0: a row at or beyond +-saturation_v, V, is left out; 0: no row is saturated */
     eits_real saturation_v;
-    /* a local maximum below this fraction of the greatest starts no touch */
+    /* a local maximum of the image below this fraction of the greatest one starts no touch */
     eits_real touch_threshold;
     /* a touch that explains less than this fraction of |y|^2 beside the others is dropped */
     eits_real touch_min_fraction;
@@ -109,10 +109,10 @@ typedef struct eits_options {
     eits_real touch_radius_weight;
     /* sweeps of the off-grid fit over all touches; 0: peaks with their strengths only */
     uint32_t touch_sweeps;
-    /* how far from where its velocity brings it a touch may be found in the next frame and keep its
-     * id */
+    /* a touch keeps its id if the next frame shows it within this distance of the place to which
+     * its velocity brings it */
     eits_real follow_mm;
-    /* > 0: stop with the best so far before info.macs goes beyond this (solve.h) */
+    /* > 0: stop with the best image so far before info.macs exceeds this (solve.h); 0: no limit */
     uint32_t mac_limit;
     /* the diagnostics that are examined, one bit each */
     uint32_t diagnostics;

@@ -1,8 +1,8 @@
 /* eitskin: packets between a board and a host: their numbers and the layout of their payloads.
  *
  * Payloads are little-endian and have no padding; a test compares their sizes and places with those
- * of the compiler. docs/reference/link-protocol.md says how they are used, link.h has their codec.
- * Numbers of packets, statuses, faults and bits never get another meaning.
+ * of the compiler. docs/reference/link-protocol.md says how they are used, and link.h has their
+ * codec. Numbers of packets, statuses, faults and bits never get another meaning.
  *
  * Written by tables/make_tables.py from tables/link.toml.
  */
@@ -25,7 +25,7 @@ extern "C" {
 /* The most characters of a board's name. */
 #define EITS_NAME_CHARACTERS  32u
 
-/* Below 0x80 from the board, from there on to it. */
+/* Types below 0x80 are sent by the board, the others by the host. */
 typedef enum eits_packet_type {
     /* the board, its model and its settings */
     EITS_PACKET_INFO = 0x01,
@@ -37,33 +37,33 @@ typedef enum eits_packet_type {
     EITS_PACKET_IMAGE = 0x11,
     /* a frame's touches */
     EITS_PACKET_TOUCHES = 0x12,
-    /* what a frame's touches amounted to */
+    /* a frame's events: taps, swipes and other gestures */
     EITS_PACKET_EVENTS = 0x15,
     /* touches after a drive */
     EITS_PACKET_DRIVE_TOUCHES = 0x17,
     /* the board's counters */
     EITS_PACKET_STATS = 0x13,
-    /* a fault that rose or went */
+    /* a fault that was raised or cleared */
     EITS_PACKET_FAULT = 0x14,
     /* SHA-256 of the model and of the firmware */
     EITS_PACKET_HASHES = 0x16,
-    /* codes of a fixed row */
+    /* the converter's codes for one row */
     EITS_PACKET_PROBED = 0x18,
     /* never on a wire: the first packet of an .eits file */
     EITS_PACKET_RECORDING = 0x70,
     /* send an INFO */
     EITS_PACKET_GET_INFO = 0x80,
-    /* what to send of each frame */
+    /* choose what the board sends for each frame */
     EITS_PACKET_STREAM = 0x81,
     /* take the reference */
     EITS_PACKET_TARE = 0x82,
-    /* how frames are scanned; forgets the reference */
+    /* set how frames are scanned, and forget the reference */
     EITS_PACKET_SCAN = 0x83,
-    /* the solver's options */
+    /* set the solver's options */
     EITS_PACKET_SOLVER = 0x84,
     /* stop the scan and erase the bank that is not in use */
     EITS_PACKET_MODEL_BEGIN = 0x85,
-    /* bytes of the model */
+    /* store bytes of the model */
     EITS_PACKET_MODEL_DATA = 0x86,
     /* use the model that was sent */
     EITS_PACKET_MODEL_COMMIT = 0x87,
@@ -77,58 +77,60 @@ typedef enum eits_packet_type {
     EITS_PACKET_SELF_TEST = 0x8b,
     /* forget the faults */
     EITS_PACKET_CLEAR_FAULTS = 0x8c,
-    /* the host is there, or goes and the current stops; not answered */
+    /* the host is present; or it leaves, and the current stops. Not answered */
     EITS_PACKET_KEEPALIVE = 0x8d,
-    /* the owner's settings, kept in flash */
+    /* store the owner's settings in flash */
     EITS_PACKET_SETTINGS = 0x8e,
     /* send HASHES */
     EITS_PACKET_GET_HASHES = 0x8f,
-    /* measure a fixed row once and send PROBED */
+    /* measure one row once, and send a PROBED */
     EITS_PACKET_PROBE = 0x90
 } eits_packet_type;
 
-/* The result of a command; `detail` of the reply adds to it. */
+/* The result of a command. The reply's `detail` adds to it; [0] and [1] are its two numbers. */
 typedef enum eits_reply_status {
-    /* MODEL_BEGIN: [0] the offset to go on from */
+    /* the command was carried out; of MODEL_BEGIN: [0] the offset to continue from */
     EITS_REPLY_OK = 0,
     /* no command has this packet type */
     EITS_REPLY_UNKNOWN_COMMAND = 1,
-    /* [0] bytes of payload that are expected */
+    /* the payload has the wrong length: [0] the expected bytes */
     EITS_REPLY_LENGTH = 2,
-    /* [0] offset in the payload of the field out of range; [1] the limit it broke */
+    /* a field is out of range: [0] its offset in the payload; [1] the limit that it exceeded */
     EITS_REPLY_RANGE = 3,
     /* no model is in use: send one first */
     EITS_REPLY_NO_MODEL = 4,
-    /* there is no reference: send a TARE first; of a TARE: none to bring back */
+    /* there is no reference: send a TARE first; of a TARE: there is no earlier reference to
+     * restore */
     EITS_REPLY_NOT_TARED = 5,
-    /* [0] type of the command under way */
+    /* another command is still running: [0] its packet type */
     EITS_REPLY_BUSY = 6,
-    /* [0] most bytes that a bank, a packet or the memory holds */
+    /* the model is too large: [0] the bytes that a bank, a packet or the memory can hold */
     EITS_REPLY_MODEL_SIZE = 7,
-    /* [0] eits_status */
+    /* the core rejected the model: [0] eits_status */
     EITS_REPLY_MODEL_INVALID = 8,
-    /* [0] electrodes that the protocol needs; [1] electrodes there are */
+    /* the board has too few electrodes: [0] those that the protocol needs; [1] those of the
+     * board */
     EITS_REPLY_MODEL_SCAN = 9,
-    /* what arrived is not what MODEL_BEGIN announced */
+    /* the bytes that arrived do not have the checksum that MODEL_BEGIN announced */
     EITS_REPLY_MODEL_CRC = 10,
-    /* MODEL_DATA out of order: [0] the offset expected; -1: no upload is under way */
+    /* MODEL_DATA came out of order: [0] the expected offset; -1: no upload has begun */
     EITS_REPLY_OFFSET = 11,
-    /* [0] the offset where erasing or programming failed */
+    /* erasing or programming failed: [0] the offset */
     EITS_REPLY_FLASH = 12,
-    /* [0] eits_status of the core */
+    /* the core reported an error: [0] eits_status */
     EITS_REPLY_CORE = 13,
-    /* [0] the nearest number of samples that is whole excitation periods */
+    /* the samples do not span whole excitation periods: [0] the nearest number that does */
     EITS_REPLY_PERIODS = 14,
-    /* [0] least frame period of this scan, us */
+    /* the frame period is too short: [0] the shortest one for this scan, us */
     EITS_REPLY_TOO_FAST = 15,
-    /* [0] difference to the golden image in parts per 1e9 of its peak */
+    /* the self-test failed: [0] difference from the golden image in parts per 1e9 of its peak */
     EITS_REPLY_SELF_TEST = 16,
-    /* the owner has locked the board: its blue button must be held */
+    /* the owner has locked the board: hold its blue button */
     EITS_REPLY_LOCKED = 17,
-    /* the current was above its limit: CLEAR_FAULTS first */
+    /* the current was above its limit: send CLEAR_FAULTS first */
     EITS_REPLY_TRIPPED = 18,
-    /* touches after each drive want a model with fields, a reference that stays, full scans and
-     * every frame */
+    /* touches after each drive need a model with fields, a reference that is not tracked, full
+     * scans, and every frame streamed */
     EITS_REPLY_DRIVES = 19
 } eits_reply_status;
 
@@ -138,14 +140,14 @@ typedef enum eits_quality {
     EITS_QUALITY_SATURATED = 1,
     /* the multiplexers were switched later than the settling time before the first sample */
     EITS_QUALITY_UNSETTLED = 2,
-    /* it and its reciprocal disagree (full scans and checks) */
+    /* the row and its reciprocal disagree (in full scans and checks) */
     EITS_QUALITY_RECIPROCITY = 4,
-    /* not measured: its reciprocal's value */
+    /* the row was not measured, and has its reciprocal's value */
     EITS_QUALITY_COPIED = 8,
-    /* one of its electrodes is taken to be open: only without a reference and in a tare; then the
-     * core finds them */
+    /* one of its electrodes seems to be open. Set only without a reference and during a tare; later
+     * the core finds open electrodes */
     EITS_QUALITY_OPEN = 16,
-    /* left out by MASK_ROW */
+    /* the row is left out by MASK_ROW */
     EITS_QUALITY_MASKED = 32
 } eits_quality;
 
@@ -153,34 +155,37 @@ typedef enum eits_quality {
 typedef enum eits_fault {
     /* no bank holds a valid model; value: eits_status of the newest bank */
     EITS_FAULT_NO_MODEL = 1,
-    /* index: electrode */
+    /* an electrode is open; index: electrode */
     EITS_FAULT_ELECTRODE_OPEN = 2,
-    /* index: first row; value: rows */
+    /* rows are saturated; index: the first; value: their number */
     EITS_FAULT_SATURATED = 3,
-    /* a frame took longer than the frame period; value: us over */
+    /* a frame took longer than the frame period; value: by how many us */
     EITS_FAULT_DEADLINE = 4,
-    /* index: worst row; value: parts per thousand of the rms voltage */
+    /* reciprocal rows disagree; index: the worst row; value: its difference in parts per thousand
+     * of the rms voltage */
     EITS_FAULT_RECIPROCITY = 5,
     /* the core rejected the frame; value: eits_status */
     EITS_FAULT_SOLVER = 6,
-    /* the converter or its DMA gave nothing in time */
+    /* the converter or its DMA delivered nothing in time */
     EITS_FAULT_SCAN_STALLED = 7,
     /* the board restarted after a processor fault; words: pc, lr, cfsr, hfsr, address */
     EITS_FAULT_CRASH = 8,
     /* the board restarted because the program hung */
     EITS_FAULT_WATCHDOG = 9,
-    /* the generator or the multiplexers could not be written */
+    /* writing to the generator or the multiplexers failed */
     EITS_FAULT_BUS = 10,
-    /* index: electrode; value: its partner, -1 where more than two are bridged; words[0], [1]: all
-     * of them, bit e */
+    /* electrodes are bridged; index: one of them; value: its partner, or -1 if more than two are
+     * bridged; words[0], [1]: bit e for each such electrode e */
     EITS_FAULT_BRIDGED = 11,
-    /* index: electrode */
+    /* an electrode is noisy; index: electrode */
     EITS_FAULT_ELECTRODE_NOISY = 12,
-    /* value: parts per thousand of the data; 0: from signs, not a fraction */
+    /* no change of the skin explains the frame; value: the unexplained parts per thousand of the
+     * data, or 0 if the signs of rows show it */
     EITS_FAULT_MODEL_MISMATCH = 13,
-    /* only solved frames raise it; a tare ends it */
+    /* frames change in a way that touches cannot; only solved frames raise it, and a tare clears
+     * it */
     EITS_FAULT_STALE_REFERENCE = 14,
-    /* likewise */
+    /* the reference is unlike the model's; only solved frames raise it, and a tare clears it */
     EITS_FAULT_UNLIKE_MODEL = 15,
     /* the current was above its limit and was switched off; value: uA rms */
     EITS_FAULT_CURRENT = 16,
@@ -195,30 +200,31 @@ typedef enum eits_fault {
 } eits_fault;
 #define EITS_FAULTS 21u
 
-/* ELECTRODE_OPEN, SATURATED and BRIDGED rise in the frame that shows them, MODEL_MISMATCH,
- * ELECTRODE_NOISY, STALE_REFERENCE and UNLIKE_MODEL with the third in a row, since a touch that
- * lands within a scan gives one such frame; all these are gone after so many frames in a row
- * without them. */
+/* ELECTRODE_OPEN, SATURATED and BRIDGED are raised by the first frame that shows them.
+ * MODEL_MISMATCH, ELECTRODE_NOISY, STALE_REFERENCE and UNLIKE_MODEL are raised by the third
+ * consecutive frame that shows them (RAISE), since a touch that lands within a scan causes one such
+ * frame. Each of these faults is cleared by the eighth consecutive frame without it (CLEAR). */
 #define EITS_FAULT_RAISE_FRAMES 3u
 #define EITS_FAULT_CLEAR_FRAMES 8u
 
 /* Bits of a RAW's flags. */
 typedef enum eits_raw_flags {
-    /* a frame of a tare */
+    /* the frame belongs to a tare */
     EITS_RAW_REFERENCE = 1,
     /* only one row of each reciprocal pair was measured */
     EITS_RAW_RECIPROCAL = 2,
-    /* a full scan among such, for the check of reciprocity */
+    /* a full scan between half ones, which checks reciprocity */
     EITS_RAW_CHECK = 4,
-    /* the touches after each drive brought it to the instant of its last drive */
+    /* the tracker brought all rows to the instant of the last drive */
     EITS_RAW_ALIGNED = 8,
-    /* and it was solved: its drives are accounted for */
+    /* the frame was solved: touches explain its drives, or frames have not been explained for a
+     * while */
     EITS_RAW_TRUSTED = 16,
-    /* the tracker of touches began with it */
+    /* the tracker began with this frame */
     EITS_RAW_BEGUN = 32
 } eits_raw_flags;
 
-/* Bits of what is streamed of each frame. */
+/* Bits that choose what is streamed for each frame. */
 typedef enum eits_stream {
     /* its voltages, as a RAW */
     EITS_STREAM_RAW = 1,
@@ -226,41 +232,41 @@ typedef enum eits_stream {
     EITS_STREAM_IMAGE = 2,
     /* its touches, as TOUCHES */
     EITS_STREAM_TOUCHES = 4,
-    /* its events, as EVENTS, also where there are none; a tare forgets fingers */
+    /* its events, as EVENTS, also if there are none; a tare forgets the fingers */
     EITS_STREAM_EVENTS = 8,
     /* touches after each drive, as DRIVE_TOUCHES */
     EITS_STREAM_DRIVE_TOUCHES = 16
 } eits_stream;
 
-/* The board, its model and its settings. Fields are added at its end. */
+/* The board, its model and its settings. New fields are added at the end. */
 typedef struct eits_packet_info {
-    /* of the GET_INFO that asked; 0 after a restart */
+    /* that of the GET_INFO which asked; 0 after a restart */
     uint32_t request;
     /* major, minor, patch, 0 */
     uint8_t firmware[4];
-    /* such as nucleo_f767zi, zero-filled */
+    /* the kind of board, such as nucleo_f767zi; zero-filled */
     char board[16];
     /* the processor's serial number, hexadecimal, zero-filled */
     char serial[24];
     /* processor clock, Hz */
     uint32_t f_cpu_hz;
-    /* of the multiplexers */
+    /* electrodes that the multiplexers can reach */
     uint32_t electrodes;
-    /* most bytes of a model */
+    /* the size of a bank: the most bytes of a model */
     uint32_t bank_bytes;
-    /* most bytes in one MODEL_DATA */
+    /* the most bytes in one MODEL_DATA */
     uint32_t data_bytes;
-    /* of the model in use; 0: none */
+    /* size of the model in use; 0: no model */
     uint32_t model_bytes;
     /* CRC-32 of the whole model file, as zlib's crc32 */
     uint32_t model_crc;
-    /* of the protocol that is scanned */
+    /* hash of the protocol that is scanned */
     uint64_t protocol_hash;
-    /* of the model, as all down to storage */
+    /* electrodes of the model; the fields down to storage describe the model, too */
     uint32_t n_electrodes;
-    /* of its protocol */
+    /* rows of its protocol */
     uint32_t n_rows;
-    /* its rows once reciprocal ones are averaged */
+    /* rows that are left when reciprocal ones are averaged */
     uint32_t n_folded;
     /* numbers of the reduced data */
     uint32_t rank;
@@ -272,69 +278,69 @@ typedef struct eits_packet_info {
     uint32_t ny;
     /* eits_storage: 0 f32, 1 f16, 2 i16, 3 i8 */
     uint32_t storage;
-    /* that the model is in */
+    /* the bank that holds the model */
     uint32_t bank;
-    /* as the generator's tuning word gives it */
+    /* excitation frequency, as the generator's tuning word gives it */
     uint32_t excitation_millihz;
-    /* of the converter */
+    /* sample rate of the converter */
     uint32_t sample_rate_hz;
-    /* of a measurement */
+    /* samples per measurement */
     uint16_t samples;
-    /* settling time */
+    /* settling time before the first sample */
     uint16_t settle_us;
-    /* from one measurement to the next; 0, as all of the scan: the frames are another
-     * instrument's */
+    /* time from one measurement to the next; 0, as all numbers of the scan, if the frames come from
+     * another instrument */
     uint32_t slot_us;
-    /* every n-th frame is scanned fully; 1: all; 0: none */
+    /* every n-th frame is scanned fully; 1: all frames; 0: none */
     uint16_t check_every;
-    /* bits of eits_stream */
+    /* bits of eits_stream: what is streamed */
     uint16_t streaming;
     /* every n-th frame is streamed */
     uint16_t every;
     /* 1: there is a reference */
     uint16_t tared;
-    /* 0: as fast as the scan goes */
+    /* time from one frame to the next; 0: as fast as the scan allows */
     uint32_t frame_period_us;
     /* bit k: fault number k is raised */
     uint32_t faults;
-    /* between the electrodes, for one step of the converter */
+    /* voltage between the electrodes that is one step of the converter */
     uint32_t volts_per_code_nv;
-    /* eits_drive */
+    /* eits_drive: whether current may flow */
     uint16_t drive;
     /* bits of eits_setting */
     uint16_t settings;
-    /* what the current source gives as built; 0: not known */
+    /* current that the source gives as built; 0: not known */
     uint32_t source_ua_rms;
-    /* as measured last; 0: there is no sense resistor, or no current */
+    /* current as last measured; 0: there is no sense resistor, or no current */
     uint32_t current_ua_rms;
-    /* above which the drive goes off; 0: none */
+    /* current above which the drive is switched off; 0: no limit */
     uint32_t current_limit_ua_rms;
-    /* that the owner gave the board, zero-filled; empty: none */
+    /* name that the owner gave the board, zero-filled; empty: none */
     char name[32];
     /* amplitude of the current source; 0: not known */
     uint32_t source_ua;
     /* volts at the converter per volt between the electrodes, in millionths; 0: not known */
     uint32_t gain_ppm;
-    /* the level of the button's pin now; 2: there is none */
+    /* present level of the button's pin; 2: there is no button */
     uint32_t button;
-    /* 0 */
+    /* must be 0 */
     uint32_t reserved;
 } eits_packet_info;
 
 /* The result of the command with this request number. */
 typedef struct eits_packet_reply {
-    /* of the command that is answered */
+    /* request number of the command that is answered */
     uint32_t request;
     /* its packet type */
     uint16_t command;
     /* eits_reply_status */
     uint16_t status;
-    /* by status */
+    /* meaning depends on the status */
     int32_t detail[2];
 } eits_packet_reply;
 
-/* A scanned frame. n_rows numbers in V follow in the protocol's order, the very numbers that the
- * board's core got, NaN for a row that could not be used; then as many quality bytes. */
+/* A scanned frame. It is followed by n_rows voltages, V, in the protocol's order, exactly as the
+ * board's core got them, NaN for a row that could not be used; then by n_rows quality bytes. */
 typedef struct eits_packet_raw {
     /* counts scanned frames; wraps */
     uint32_t frame;
@@ -342,138 +348,140 @@ typedef struct eits_packet_raw {
     uint32_t time_us;
     /* how long the scan took */
     uint32_t scan_us;
-    /* voltages, and quality bytes, that follow */
+    /* number of voltages, and of quality bytes, that follow */
     uint16_t n_rows;
     /* bits of eits_raw_flags */
     uint16_t flags;
 } eits_packet_raw;
 
-/* Head of IMAGE and TOUCHES: what eits_info says, and the times. */
+/* The head of IMAGE and TOUCHES: the numbers of eits_info, and times. */
 typedef struct eits_packet_solved {
     /* number of the scanned frame, as in its RAW */
     uint32_t frame;
     /* when its scan began */
     uint32_t time_us;
-    /* time for the solve */
+    /* how long the solve took */
     uint32_t solve_us;
-    /* time for the touches */
+    /* how long the touches took */
     uint32_t touch_us;
-    /* from the end of its scan until this packet was made */
+    /* time from the end of its scan until this packet was made */
     uint32_t age_us;
     /* pixels or touches that follow */
     uint16_t count;
-    /* 0, or minus an eits_status: then the image is zero and there are no touches */
+    /* 0, or minus the eits_status of a rejected frame, whose image is zero and which has no
+     * touches */
     uint16_t status;
-    /* eits_stop */
+    /* eits_stop: why the solver stopped */
     uint8_t stop;
-    /* eits_shown; 0 where no touches were looked for */
+    /* eits_shown: which image shows the frame; 0 if no touches were looked for */
     uint8_t shown;
     /* rows left out */
     uint16_t masked;
-    /* that the solver took */
+    /* iterations of the solver */
     uint32_t iterations;
     /* coefficients that are not zero */
     uint32_t nonzeros;
     /* multiply-accumulates of the solve */
     uint32_t macs;
-    /* of the touches */
+    /* multiply-accumulates of the touches */
     uint32_t touch_macs;
-    /* as used for this frame */
+    /* lambda as used for this frame */
     float lambda;
     /* the least lambda whose image is zero */
     float lambda_max;
-    /* max(S'y) of noise, by the reference; 0: unknown */
+    /* max(S'y) of noise, as the reference showed it; 0: unknown */
     float lambda_noise;
     /* relative duality gap */
     float gap_rel;
-    /* its norm */
+    /* norm of the residual */
     float residual;
     /* norm of the reduced data */
     float data_norm;
     /* bits of eits_diagnostic */
     uint32_t diagnostics;
-    /* saturated rows without masked ones: by the converter or beyond the core's limit */
+    /* saturated rows, masked ones not counted: at the converter's limit or beyond the core's */
     uint16_t saturated;
     /* rows left out as outliers */
     uint16_t outliers;
-    /* fraction of the data outside the model's range */
+    /* fraction of the data that lies outside the model's range */
     float model_mismatch;
-    /* bit e: electrode e */
+    /* bit e: electrode e is open */
     uint64_t open_electrodes;
-    /* likewise, of one or more pairs */
+    /* bit e: electrode e is bridged with another one */
     uint64_t bridged_electrodes;
-    /* likewise */
+    /* bit e: electrode e is noisy */
     uint64_t noisy_electrodes;
 } eits_packet_solved;
 
-/* A touch, as eits_touch. */
+/* A touch, like eits_touch. */
 typedef struct eits_packet_touch {
-    /* from 1; stays with a touch from frame to frame */
+    /* number from 1 that stays with a touch from frame to frame */
     uint32_t id;
-    /* of the centre, in the model's coordinates */
+    /* x of the centre, in the model's coordinates */
     float x_mm;
-    /* of the centre */
+    /* y of the centre */
     float y_mm;
-    /* of the disc that was fitted */
+    /* radius of the fitted disc */
     float radius_mm;
-    /* S mm^2/m */
+    /* change of conductivity times area, S mm^2/m */
     float strength_s_per_m_mm2;
-    /* fraction of the data that it alone explains, 0 to 1; 0: held, not found */
+    /* fraction of the data that only this touch explains, 0 to 1; 0: it was not found in this
+     * frame, and is held */
     float explained;
-    /* 0 where the model is not calibrated */
+    /* force, N; 0 if the model is not calibrated */
     float force_n;
-    /* probability that it is one touch; 0: not known */
+    /* probability that this is exactly one touch; 0: not known */
     float confidence;
-    /* covariance of the centre; 0: not known */
+    /* covariance of the centre, with the next two; 0: not known */
     float x_variance_mm2;
     float xy_covariance_mm2;
     float y_variance_mm2;
-    /* half of the long axis as a vector; 0, 0: a disc, or not known */
+    /* half of an ellipse's long axis, as a vector; 0, 0: a disc, or not known */
     float long_x_mm;
     float long_y_mm;
-    /* standard deviation of the radius; 0: the data do not tell the radius */
+    /* standard deviation of the radius; 0: the data do not determine the radius */
     float radius_sd_mm;
     /* 1: a whole frame has shown it */
     uint32_t confirmed;
 } eits_packet_touch;
 
-/* Touches as of an instant within a scan. Where nothing touches it is sent once: when that begins,
- * or the touches have gone. */
+/* Touches at an instant within a scan. While nothing touches the skin, the packet is sent only
+ * once: after the tracker has begun, or after the last touch has gone. */
 typedef struct eits_packet_drive_touches {
     /* number of the frame that is scanned */
     uint32_t frame;
-    /* the instant they hold for: the middle of the drive, were no row repeated */
+    /* the instant for which they hold: the middle of the drive, as if no row had been repeated */
     uint32_t time_us;
-    /* the frame before which nothing was known */
+    /* the frame with which the tracker began */
     uint32_t begun;
-    /* from the end of the drive until this packet was made; at most 65,535 */
+    /* time from the end of the drive until this packet was made; at most 65,535 */
     uint16_t age_us;
-    /* of it for the update; likewise */
+    /* the part of it that the tracker took; at most 65,535 */
     uint16_t update_us;
-    /* of the protocol, in the order of first rows */
+    /* number of the drive; drives are in the order of their first rows */
     uint16_t drive;
     /* touches that follow */
     uint16_t count;
 } eits_packet_drive_touches;
 
-/* A touch, as eits_fast_touch. */
+/* A touch, like eits_fast_touch. */
 typedef struct eits_packet_drive_touch {
-    /* from 1, as in TOUCHES; stays with a touch */
+    /* number from 1 that stays with a touch, the same as in TOUCHES */
     uint16_t id;
     /* 1: a whole frame has shown it */
     uint16_t confirmed;
-    /* of the centre, in the model's coordinates */
+    /* x of the centre, in the model's coordinates */
     float x_mm;
-    /* of the centre */
+    /* y of the centre */
     float y_mm;
-    /* its velocity */
+    /* velocity */
     float vx_mm_per_s;
     float vy_mm_per_s;
-    /* S mm^2/m */
+    /* change of conductivity times area, S mm^2/m */
     float strength_s_per_m_mm2;
-    /* of the disc that it is taken for */
+    /* radius of the disc with which the touch is modelled */
     float radius_mm;
-    /* covariance of the centre */
+    /* covariance of the centre, with the next two */
     float x_variance_mm2;
     float xy_covariance_mm2;
     float y_variance_mm2;
@@ -489,36 +497,36 @@ typedef struct eits_packet_events {
     uint32_t count;
 } eits_packet_events;
 
-/* One event, as eits_event (gesture_events.h); its time is the frame's, its zone the host's. */
+/* One event, like eits_event (gesture_events.h), at its frame's time. The host adds zones. */
 typedef struct eits_packet_event {
     /* eits_event_kind */
     uint16_t kind;
     /* eits_event_phase */
     uint16_t phase;
-    /* of the touch, as it was when it landed */
+    /* id that the touch had when it landed */
     uint32_t first_id;
-    /* of two fingers the second; else 0 */
+    /* id of the second of two fingers; 0 for gestures of one finger */
     uint32_t second_id;
-    /* where */
+    /* place of the event */
     float x_mm;
     float y_mm;
-    /* of a swipe, 0 along x, 90 along y */
+    /* direction of a swipe: 0 along x, 90 along y */
     float direction_deg;
-    /* by kind */
+    /* meaning depends on the kind */
     float value;
 } eits_packet_event;
 
 /* Stages that are timed. */
 typedef enum eits_stage {
-    /* from the first measurement of a frame to its last */
+    /* the scan, from a frame's first measurement to its last */
     EITS_STAGE_SCAN = 0,
-    /* processor time in interrupts within the scan */
+    /* processor time that interrupts take during the scan */
     EITS_STAGE_DEMODULATE = 1,
     /* frame stage and solver */
     EITS_STAGE_SOLVE = 2,
-    /* touch detection and fit, where touches are streamed */
+    /* touch detection and fit, if touches are streamed */
     EITS_STAGE_TOUCHES = 3,
-    /* what is left between scan and end: packets are made and queued */
+    /* the rest between the scan and the end of the frame: packets are made and queued */
     EITS_STAGE_SEND = 4,
     /* the whole frame */
     EITS_STAGE_FRAME = 5
@@ -529,67 +537,66 @@ typedef enum eits_stage {
 typedef struct eits_stage_stats {
     /* frames that were timed */
     uint32_t count;
-    /* of the last such frame */
+    /* time of the last such frame */
     uint32_t last_us;
     /* 99th percentile: the upper edge of its bin, an eighth of an octave wide */
     uint32_t p99_us;
-    /* of all since the start, or since GET_STATS set the times to zero */
+    /* longest time since the start, or since GET_STATS set the times to zero */
     uint32_t worst_us;
 } eits_stage_stats;
 
 /* The board's counters. */
 typedef struct eits_packet_stats {
-    /* of the GET_STATS that asked */
+    /* that of the GET_STATS which asked */
     uint32_t request;
-    /* since the start */
+    /* time since the start */
     uint32_t uptime_ms;
-    /* streamed or not */
+    /* frames that were scanned, streamed or not */
     uint32_t frames_scanned;
-    /* where image or touches were streamed */
+    /* frames that were solved because image or touches are streamed */
     uint32_t frames_solved;
-    /* since the link came up */
+    /* packets sent since the link came up */
     uint32_t packets_sent;
-    /* a dropped packet still takes a sequence number */
+    /* packets that were dropped; each still takes a sequence number */
     uint32_t packets_dropped;
     /* frame periods missed */
     uint32_t deadlines_missed;
-    /* measurements taken again because the switch came too late */
+    /* measurements repeated because the multiplexers switched too late */
     uint32_t slots_repeated;
-    /* rows left out as outliers, of all frames since there is a reference */
+    /* rows left out as outliers in all frames since the reference was taken */
     uint32_t outliers;
     /* commands received */
     uint32_t link_packets;
     /* whole packets whose checksum does not fit */
     uint32_t link_crc_errors;
-    /* ended inside a COBS block, or shorter than head and checksum */
+    /* packets that ended inside a COBS block, or shorter than head and checksum */
     uint32_t link_framing_errors;
-    /* longer than the receive buffer */
+    /* packets longer than the receive buffer */
     uint32_t link_overruns;
-    /* that are set aside */
+    /* bytes reserved for the stack */
     uint32_t stack_bytes;
-    /* the most so far */
+    /* the most bytes of it used so far */
     uint32_t stack_used;
-    /* for the model's context and its frames */
+    /* bytes reserved for the model's context and its frames */
     uint32_t workspace_bytes;
-    /* of them by the model in use */
+    /* bytes of it that the model in use takes */
     uint32_t workspace_used;
-    /* by eits_stage */
+    /* times, indexed by eits_stage */
     eits_stage_stats stage[6];
 } eits_packet_stats;
 
-/* A fault that rose or went. */
+/* A fault that was raised or cleared. */
 typedef struct eits_packet_fault {
     /* eits_fault */
     uint16_t code;
-    /* 1: it is there; 0: it has gone */
+    /* 1: the fault was raised; 0: it was cleared */
     uint16_t raised;
-    /* in which it rose or went */
+    /* the frame in which that happened */
     uint32_t frame;
-    /* by code, as value and words */
+    /* index, value and words: their meaning depends on the code (eits_fault) */
     int32_t index;
-    /* by code */
     int32_t value;
-    /* by code; 0 where it has none */
+    /* 0 if the code has none */
     uint32_t words[5];
 } eits_packet_fault;
 
@@ -603,44 +610,45 @@ typedef struct eits_command_plain {
 typedef struct eits_command_stream {
     /* never 0; the reply repeats it */
     uint32_t request;
-    /* bits of eits_stream; 0 stops */
+    /* bits of eits_stream; 0 stops the stream */
     uint16_t what;
-    /* every n-th frame, at least 1 */
+    /* stream every n-th frame; at least 1 */
     uint16_t every;
-    /* so many streamed frames, then stop; 0: until stopped */
+    /* stop after this many streamed frames; 0: stream until stopped */
     uint32_t frames;
 } eits_command_stream;
 
-/* Take the reference; the reply comes when that is done. */
+/* Take the reference. The reply comes when that is done. */
 typedef struct eits_command_tare {
     /* never 0; the reply repeats it */
     uint32_t request;
-    /* 1, or 4 to 1024; 0: the reference before the last tare comes back, where it is kept */
+    /* frames to take: 1, or 4 to 1024; 0: restore the reference from before the last tare, if it
+     * was kept */
     uint32_t frames;
 } eits_command_tare;
 
-/* Sets how frames are scanned; forgets the reference. */
+/* Set how frames are scanned. The board forgets its reference. */
 typedef struct eits_command_scan {
     /* never 0; the reply repeats it */
     uint32_t request;
-    /* 1,000 to 250,000,000, below half the sample rate */
+    /* excitation frequency: 1,000 to 250,000,000, below half the sample rate */
     uint32_t excitation_millihz;
-    /* 1,000 to 5,000,000 */
+    /* sample rate of the converter: 1,000 to 5,000,000 */
     uint32_t sample_rate_hz;
-    /* 4 to 1024 */
+    /* samples per measurement: 4 to 1024 */
     uint16_t samples;
-    /* at most 50,000 */
+    /* settling time before the first sample: at most 50,000 */
     uint16_t settle_us;
-    /* 1: every frame is full; n > 1: one row of each reciprocal pair, every n-th frame full; 0:
-     * never full */
+    /* 1: every frame is scanned fully; n > 1: only every n-th one, the others with one row of each
+     * reciprocal pair; 0: none is scanned fully */
     uint16_t check_every;
-    /* 0 */
+    /* must be 0 */
     uint16_t reserved;
-    /* at most 600,000,000; 0: as fast as the scan goes */
+    /* time from one frame to the next: at most 600,000,000; 0: as fast as the scan allows */
     uint32_t frame_period_us;
 } eits_command_scan;
 
-/* The solver's options, from the next frame on until another model or a restart. */
+/* Set the solver's options, from the next frame on until another model or a restart. */
 typedef struct eits_command_solver {
     /* never 0; the reply repeats it */
     uint32_t request;
@@ -658,27 +666,27 @@ typedef struct eits_command_solver {
     float gap_rel;
     /* eits_solver: 0 FISTA, 1 working set, 3 active set; 2 is reserved and rejected */
     uint32_t solver;
-    /* multiply-accumulates a frame; 0: no limit */
+    /* multiply-accumulates per frame; 0: no limit */
     uint32_t mac_limit;
     /* bits of eits_diagnostic that are looked for */
     uint32_t diagnostics;
 } eits_command_solver;
 
-/* Announces a model. */
+/* Begin the upload of a model. */
 typedef struct eits_command_model_begin {
     /* never 0; the reply repeats it */
     uint32_t request;
-    /* of the model, at least 64 */
+    /* size of the model, at least 64 */
     uint32_t bytes;
     /* CRC-32 of the whole model */
     uint32_t crc;
 } eits_command_model_begin;
 
-/* Bytes of the model follow: a multiple of 4, but for the last. */
+/* Bytes of the model follow. Their number is a multiple of 4, except in the last packet. */
 typedef struct eits_command_model_data {
     /* never 0; the reply repeats it */
     uint32_t request;
-    /* of the first byte */
+    /* offset of the first byte within the model */
     uint32_t offset;
 } eits_command_model_data;
 
@@ -694,17 +702,17 @@ typedef struct eits_command_get_stats {
 typedef struct eits_command_mask_row {
     /* never 0; the reply repeats it */
     uint32_t request;
-    /* of the protocol */
+    /* row of the protocol */
     uint16_t row;
     /* 1: leave it out; 0: use it again */
     uint16_t masked;
 } eits_command_mask_row;
 
-/* Current may flow through the skin, or the reason that it may not. */
+/* Whether current may flow through the skin, and if not, why. */
 typedef enum eits_drive {
-    /* no host has asked for frames */
+    /* off: no host has asked for frames */
     EITS_DRIVE_OFF = 0,
-    /* a host has, and is heard */
+    /* on: a host has asked for frames, and still sends packets */
     EITS_DRIVE_ON = 1,
     /* off: no packet came from the host for a second */
     EITS_DRIVE_SILENT = 2,
@@ -714,79 +722,84 @@ typedef enum eits_drive {
 
 /* Bits of the owner's settings. */
 typedef enum eits_setting {
-    /* current flows on where no host listens */
+    /* the current keeps flowing when no host listens */
     EITS_SETTING_KEEP_CURRENT = 1,
-    /* models, settings and lower excitations need the blue button */
+    /* changing models or settings, or lowering the excitation frequency, needs the blue button */
     EITS_SETTING_LOCKED = 2,
-    /* a sense resistor is fitted: the current is measured */
+    /* a sense resistor is fitted, and the current is measured */
     EITS_SETTING_SENSE = 4,
-    /* the owner's button pulls its pin low, and does not lift it */
+    /* a pressed button pulls its pin low; without this bit it pulls it high */
     EITS_SETTING_BUTTON_LOW = 8
 } eits_setting;
 
-/* The host is there. Any command says so; this one asks for nothing, and is not answered. */
+/* Says that the host is present. Every command does that; this one does nothing else, and is not
+ * answered. */
 typedef struct eits_command_keepalive {
-    /* not looked at */
+    /* ignored */
     uint32_t request;
-    /* 1: it is; 0: it goes, and the current stops now */
+    /* 1: the host is present; 0: it leaves, and the current stops now */
     uint32_t present;
 } eits_command_keepalive;
 
-/* The owner's settings, all of them, kept over a loss of power. */
+/* Replace all of the owner's settings. They survive a loss of power. */
 typedef struct eits_command_settings {
     /* never 0; the reply repeats it */
     uint32_t request;
     /* bits of eits_setting */
     uint32_t settings;
-    /* at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1: as it is */
+    /* limit of the current: at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1:
+     * unchanged */
     uint32_t current_limit_ua_rms;
-    /* letters, digits, - and _, the first a letter or digit; zero-filled; empty: none */
+    /* the board's name: letters, digits, - and _, of which the first is a letter or digit;
+     * zero-filled; empty: none */
     char name[32];
-    /* amplitude of the current source as fitted, 10 to 7,000; 0: as designed; 2^32 - 1: as it is */
+    /* amplitude of the current source as fitted, 10 to 7,000; 0: as designed; 2^32 - 1:
+     * unchanged */
     uint32_t source_ua;
-    /* from electrodes to converter as fitted, 10,000 to 400,000,000; 0: as designed; 2^32 - 1: as
-     * it is */
+    /* gain from electrodes to converter as fitted, 10,000 to 400,000,000; 0: as designed; 2^32 - 1:
+     * unchanged */
     uint32_t gain_ppm;
 } eits_command_settings;
 
-/* SHA-256 of what the board's flash holds. */
+/* SHA-256 hashes of what the board's flash holds. */
 typedef struct eits_packet_hashes {
-    /* of the GET_HASHES that asked */
+    /* that of the GET_HASHES which asked */
     uint32_t request;
-    /* of the model in use; zero: none */
+    /* hash of the model in use; all zero: no model */
     uint8_t model[32];
-    /* of the program; zero: not known */
+    /* hash of the program; all zero: not known */
     uint8_t firmware[32];
 } eits_packet_hashes;
 
-/* Take one burst of a fixed row, after another one of the row before it, so that its first samples
- * show how it settles. The scan waits meanwhile. */
+/* Measure a burst of one row, switch to a second row, measure a burst of that one, and send the
+ * second burst, whose first samples show how it settles. The scan waits meanwhile. */
 typedef struct eits_command_probe {
     /* never 0; PROBED repeats it */
     uint32_t request;
-    /* electrodes of I+, I-, V+, V- of 8 bits each, the first one lowest; 2^32 - 1: all open */
+    /* electrodes of the first row: I+, I-, V+, V-, 8 bits each, I+ lowest; 2^32 - 1: all are
+     * open */
     uint32_t before;
-    /* the same of the burst that is sent */
+    /* electrodes of the second row, in the same form */
     uint32_t joined;
-    /* from the switch to the burst's first sample, at least; at most 50,000 */
+    /* least time from switching to the first sample; at most 50,000 */
     uint16_t settle_us;
-    /* 4 to 1024; those of SCAN's rate */
+    /* samples per burst, at the sample rate of SCAN: 4 to 1024 */
     uint16_t samples;
-    /* 1: it runs; 0: it is in reset */
+    /* 1: the generator runs; 0: it is held in reset */
     uint16_t generator;
-    /* 0 */
+    /* must be 0 */
     uint16_t reserved;
 } eits_command_probe;
 
-/* A burst of a fixed row; then its samples, codes of the converter, u16 each. */
+/* A burst of one row. Its samples follow: codes of the converter, u16 each. */
 typedef struct eits_packet_probed {
-    /* of the PROBE that asked */
+    /* that of the PROBE which asked */
     uint32_t request;
     /* when the burst began, on the board's clock */
     uint32_t start_us;
-    /* when its electrodes had been joined */
+    /* when its electrodes had been switched */
     uint32_t switched_us;
-    /* that follow */
+    /* number of samples that follow */
     uint16_t samples;
     /* 1: the converter lost samples */
     uint16_t lost;

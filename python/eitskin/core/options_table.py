@@ -23,11 +23,12 @@ class OptionFields:
     and ranges.
     """
 
-    iterations: int  # the maximum number of iterations; FISTA runs exactly so many if gap_rel is 0
-    max_touches: int  # the maximum number of touches that are reported; by default the model's
+    # the maximum number of iterations; FISTA runs exactly this many if gap_rel is 0
+    iterations: int
+    max_touches: int  # the maximum number of touches that are reported; the default is the model's
     # the core rejects a frame in which more rows cannot be used; by default half of the rows
     max_masked: int
-    solver: str  # fista, working-set or active-set (solve.h)
+    solver: str  # the method: fista, working-set or active-set (solve.h)
     # 1: ignore changes along the reference frame, that is, drift of the gain; the default is 1, in
     # taught models 0
     project_reference: bool
@@ -36,7 +37,8 @@ class OptionFields:
     lambda_noise_factor: float
     # a frame has no touch if lambda_max < detection_factor lambda_noise; 0: no threshold
     detection_factor: float
-    touch_threshold: float  # a local maximum below this fraction of the greatest starts no touch
+    # a local maximum of the image below this fraction of the greatest one starts no touch
+    touch_threshold: float
     # a touch that explains less than this fraction of |y|^2 beside the others is dropped
     touch_min_fraction: float
     touch_min_radius_mm: float  # the least radius of a touch
@@ -47,8 +49,8 @@ class OptionFields:
     # weight, against the data, of the radius that touch_change_s_per_m implies, relative to the
     # touch's own energy
     touch_radius_weight: float
-    # how far from where its velocity brings it a touch may be found in the next frame and keep its
-    # id
+    # a touch keeps its id if the next frame shows it within this distance of the place to which its
+    # velocity brings it
     follow_mm: float
     # 1: discs start where they explain most of the data, one after the other, and each is placed
     # again beside the others; 0: they start at the image's peaks. The default is 0, in taught
@@ -65,16 +67,18 @@ class OptionFields:
     gap_every: int = 10
     # the change that is looked for: increase (conducting touches), decrease or both
     sign: str = "increase"
-    # 1: start from the last frame's coefficients, momentum reset (solve.h)
+    # 1: start from the last frame's coefficients, with the momentum reset (solve.h)
     warm_start: bool = False
     # > 0: lambda itself; 0: lambda is the greater of lambda_rel lambda_max and lambda_noise_factor
     # lambda_noise
     lambda_abs: float = 0.0
     gap_rel: float = 0.0  # > 0: stop once the duality gap <= gap_rel |y|^2 / 2
-    saturation_v: float = 0.0  # > 0: a row at or beyond +-saturation_v, V, is left out; 0: none is
+    # > 0: a row at or beyond +-saturation_v, V, is left out; 0: no row is saturated
+    saturation_v: float = 0.0
     # sweeps of the off-grid fit over all touches; 0: peaks with their strengths only
     touch_sweeps: int = 6
-    mac_limit: int = 0  # > 0: stop with the best so far before info.macs goes beyond this (solve.h)
+    # > 0: stop with the best image so far before info.macs exceeds this (solve.h); 0: no limit
+    mac_limit: int = 0
     diagnostics: int = ALL_DIAGNOSTICS  # the diagnostics that are examined, one bit each
     # 1: if more than one touch is found, eits_find_touches solves the frame again with their
     # interaction taken out of the data; image and info are then those of the second solve. Ignored

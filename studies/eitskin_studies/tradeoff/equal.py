@@ -168,26 +168,29 @@ def _share(value: float) -> str:
     return f"{value:.3f}".lstrip("0")
 
 
-def verdict(front: Front) -> str:
-    """The table in two sentences for each SNR: the best of eitskin's images and of other methods
-    on the longest and on the shortest scan."""
-    every = reached(front)
-    lines = []
+BEST_HEAD = ("SNR", "scan", "image shown", "best solver's image", "best other method")
+
+
+def best_table(front: Front) -> Tabular:
+    """For each SNR, on the longest and on the shortest scan: eitskin's image shown, and the best of
+    its solver's images and of the other methods."""
+    every, rows = reached(front), []
     for snr_db in sorted({one.snr_db for one in every}):
-        parts = []
         for scan in (SCANS[0], SCANS[-1]):
             here = [one for one in every if (one.scan, one.snr_db) == (scan, snr_db)]
             shown = next((one for one in here if one.name == SHOWN[0][0]), None)
             ours = max((one for one in here if one.ours and one is not shown), key=_mean)
-            others = [one for one in here if not one.ours]
-            text = f"{scan.name}: image shown {_share(shown.mean)}" if shown else f"{scan.name}:"
-            text += f", best solver's image {_share(ours.mean)}"
-            if others:
-                best = max(others, key=_mean)
-                text += f", best other method {best.name} {_share(best.mean)}"
-            parts.append(text)
-        lines.append(f"- {snr_db:g} dB, " + "; ".join(parts) + ".")
-    return "\n".join(lines)
+            other = max((one for one in here if not one.ours), key=_mean, default=None)
+            rows.append(
+                (
+                    f"{snr_db:g} dB",
+                    scan.name,
+                    _share(shown.mean) if shown else "-",
+                    _share(ours.mean),
+                    f"{_share(other.mean)}, {other.name}" if other else "-",
+                )
+            )
+    return BEST_HEAD, rows
 
 
 def _mean(one: Reached) -> float:

@@ -20,7 +20,7 @@ from eitskin.tuning.front import (
     named_preset,
 )
 from eitskin_studies.harness.sections import Tabular, fill_marks
-from eitskin_studies.tradeoff.equal import equal_table, scan_table, verdict
+from eitskin_studies.tradeoff.equal import best_table, equal_table, scan_table
 from eitskin_studies.tradeoff.fronts import chosen_presets
 from eitskin_studies.tradeoff.table import best_points
 
@@ -229,7 +229,7 @@ def conditions(front: Front) -> str:
 
 
 def fill_page(page: Path, front: Front, pictures: Path, names: tuple[str, ...]) -> None:
-    """Fill the marks ``conditions``, ``verdict``, ``presets``, ``followed``, ``equal``, ``scans``
+    """Fill the marks ``conditions``, ``best``, ``presets``, ``followed``, ``equal``, ``scans``
     and ``front`` of ``page``; pictures go into ``PICTURES`` beside it.
 
     Raises:
@@ -239,12 +239,13 @@ def fill_page(page: Path, front: Front, pictures: Path, names: tuple[str, ...]) 
     tables = {
         "presets": preset_table(front),
         "followed": followed_table(front),
+        "best": best_table(front),
         "equal": equal_table(front),
         "scans": scan_table(),
         "front": front_table(front),
         "recommendations": recommendation_table(front),
     }
-    texts = {"conditions": conditions(front), "verdict": verdict(front)}
+    texts = {"conditions": conditions(front)}
     fill_marks(page, "tradeoff", (texts, tables))
     folder = page.parent / PICTURES
     folder.mkdir(parents=True, exist_ok=True)
