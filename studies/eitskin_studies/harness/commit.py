@@ -4,12 +4,13 @@ import subprocess
 from collections.abc import Sequence
 
 from eitskin.errors import UsageError
-from eitskin_emulator.core_on_qemu import checkout_root
 
 
 def last_commit(paths: Sequence[str]) -> str:
     """Return the last commit that changed ``paths`` of the checkout, with "-dirty" if they have
     changes that are not committed; "unknown" without a checkout."""
+    from eitskin_emulator.core_on_qemu import checkout_root  # needs numpy, which help does not
+
     try:
         root = str(checkout_root())
     except UsageError:

@@ -18,9 +18,9 @@ MARGINS = HERE / "margins.json"
 
 HEAD = """# Hard cases
 
-This page lists what can make the numbers of an EIT skin go wrong, what eitskin promises in each case,
-and how near to breaking the promise the worst measurement came. Each case has tests that fail if the
-promise is broken ([cases.toml](../../tests/python/hard_cases/cases.toml)).
+This page lists what can make the numbers of an EIT skin go wrong, what eitskin promises in each
+case, and how near to breaking the promise the worst measurement came. Each case has tests that fail
+if the promise is broken ([cases.toml](../../tests/python/hard_cases/cases.toml)).
 
 **How to read a margin.** Each promise has a bound, and a margin is the share of the bound that the
 worst measurement used. 0 % is perfect, 100 % is at the bound, and above it a test fails. The
@@ -29,18 +29,18 @@ the tests contain the seeds. A case without a number is either right or wrong, s
 must be rejected. A *sound* result has finite numbers only; its objective, residual and duality gap
 are no worse than those of a zero image, and they are what float64 arithmetic finds for that image.
 
-**Where it runs.** Cases about numbers run in float32 on the host, with vector kernels and with plain C
-kernels, and on an emulated Cortex-M7. All three give the same bits, so they share one margin. The same
-tests also run in float64 on the host, with the same frames and the same bounds. If float64 has a far
-smaller margin, rounding to float32 uses up most of the bound; if both are about equal, it is the
-method that does. A "-" in the column of float64 marks cases that are about float32 itself (where its
-range ends, and how far it is from float64), about tracking, or about bytes and counters. Cases about
-tracking, bytes and counters run on the host alone.
+**Where it runs.** Cases about numbers run in float32 on the host, with vector kernels and with
+plain C kernels, and on an emulated Cortex-M7. All three give the same bits, so they share one
+margin. The same tests also run in float64 on the host, with the same frames and the same bounds. If
+float64 has a far smaller margin, rounding to float32 uses up most of the bound; if both are about
+equal, it is the method that does. A "-" in the column of float64 marks cases that are about float32
+itself (where its range ends, and how far it is from float64), about tracking, or about bytes and
+counters. Cases about tracking, bytes and counters run on the host alone.
 
 **Other programs** are numpy (one Gauss-Newton step), scikit-learn (Lasso) and pyEIT, for the cases
-whose frames they were given. None of them is made to judge frames. *Worse* means that the MIoU of the
-image fell, and that the program reported nothing; *right* means that it fell by at most .02; the
-number is the image's MIoU. [Peers](peers.md) has the conditions, and what eitskin does.
+whose frames they were given. None of them is made to judge frames. *Worse* means that the MIoU of
+the image fell, and that the program reported nothing; *right* means that it fell by at most .02;
+the number is the image's MIoU. [Peers](peers.md) has the conditions, and what eitskin does.
 
 `scripts/hard-cases` runs all cases, and writes this page, its pictures and the measured margins
 ([margins.json](../../tests/python/hard_cases/margins.json)).
