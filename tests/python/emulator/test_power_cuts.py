@@ -15,16 +15,27 @@ from eitskin_emulator.peripherals.flash import LARGE
 from emulated import clean, connect
 from small_models import tiny_blob
 
-OLD, NEW = tiny_blob("f32"), tiny_blob("i8")
-WORDS = -(-len(NEW) // 4) + 8  # the record is the last 8
 SPARE = slice(BANKS[1] - FLASH, BANKS[1] - FLASH + BANK_BYTES)
 
 
+def old() -> bytes:
+    return tiny_blob("f32")
+
+
+def new() -> bytes:
+    return tiny_blob("i8")
+
+
+def words() -> int:
+    """The words that an upload writes; the record is the last 8."""
+    return -(-len(new()) // 4) + 8
+
+
 def powered(image: bytes) -> EmulatedBoard:
-    """A board that uses OLD; an older model lies in the other bank."""
+    """A board that uses the old model; an older model lies in the other bank."""
     rows = np.full((1, adjacent(8).n_rows), 0.01)
     skin = AnalogSkin(adjacent(8), rows, rows, 10.0)
-    return EmulatedBoard(image, skin, (bank_bytes(OLD, 1), bank_bytes(NEW, 0)))
+    return EmulatedBoard(image, skin, (bank_bytes(old(), 1), bank_bytes(new(), 0)))
 
 
 def spare_at_each_write(image: bytes) -> list[bytes]:
@@ -32,9 +43,9 @@ def spare_at_each_write(image: bytes) -> list[bytes]:
     board = powered(image)
     device, states = connect(board), []
     board.flash.word_programmed = lambda: states.append(board.bank(1))
-    device.upload_model(NEW)
+    device.upload_model(new())
     clean(board)
-    assert len(states) == WORDS
+    assert len(states) == words()
     return [b"\xff" * BANK_BYTES, *states]
 
 
@@ -49,7 +60,7 @@ def half_written(before: bytes, after: bytes, rng: np.random.Generator) -> bytes
 
 def half_erased(rng: np.random.Generator) -> list[bytes]:
     """A sector that is being erased reads as anything; the one behind it is as it was."""
-    bank = bank_bytes(NEW, 0)
+    bank = bank_bytes(new(), 0)
     bank += b"\xff" * (BANK_BYTES - len(bank))
     noise = rng.integers(0, 256, LARGE, np.uint8)
     first = (np.frombuffer(bank[:LARGE], np.uint8) | noise).tobytes()
@@ -63,9 +74,11 @@ def half_erased(rng: np.random.Generator) -> list[bytes]:
 def test_a_model_is_open_after_every_cut(image, cuts):
     rng = np.random.default_rng(5)
     states = spare_at_each_write(image)
-    chosen = range(WORDS)
+    chosen = range(words())
     if cuts == "sample":
-        chosen = sorted({0, *rng.integers(1, WORDS - 8, 8).tolist(), *range(WORDS - 8, WORDS)})
+        chosen = sorted(
+            {0, *rng.integers(1, words() - 8, 8).tolist(), *range(words() - 8, words())}
+        )
     board = powered(image)
     spoiled = half_erased(rng)
     spoiled += [half_written(states[k], states[k + 1], rng) for k in chosen]
@@ -73,10 +86,10 @@ def test_a_model_is_open_after_every_cut(image, cuts):
         board.memories.flash[SPARE] = state
         board.lose_power()
         device = connect(board)
-        expected = NEW if state == states[-1] else OLD
+        expected = new() if state == states[-1] else old()
         assert device.board.model_crc == zlib.crc32(expected)
     # and an upload that was cut may be sent again
-    board.memories.flash[SPARE] = states[WORDS // 2]
+    board.memories.flash[SPARE] = states[words() // 2]
     board.lose_power()
-    assert connect(board).upload_model(NEW).model_crc == zlib.crc32(NEW)
+    assert connect(board).upload_model(new()).model_crc == zlib.crc32(new())
     clean(board)
