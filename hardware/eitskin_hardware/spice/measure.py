@@ -315,8 +315,8 @@ def supply_numbers(design: Design) -> Numbers:
     }
 
 
-def before() -> Numbers:
-    """The numbers of the circuit as it was described."""
+def measure_before() -> Numbers:
+    """Return the numbers of the circuit as it was described, rounded to six digits."""
     design = as_before()
     numbers = source(design)
     numbers |= {key: value for key, value in receiver(design).items() if key != "clamped_v"}
@@ -325,14 +325,23 @@ def before() -> Numbers:
     drive = Bench(design, skin_load(), (0, 1, 2, 3)).phasors("v(vplus)", "v(vminus)")
     numbers["skin_common_mode_v"] = abs(drive["v(vplus)"] + drive["v(vminus)"]) / 2
     numbers["skin_0pf_error"] = against_model(rows_of(design, skin_load()))[1]
-    return {f"before_{key}": value for key, value in numbers.items()}
+    return rounded({f"before_{key}": value for key, value in numbers.items()})
 
 
-def measure_all() -> Numbers:
-    """Return every number, rounded to six digits."""
+def measure_now() -> Numbers:
+    """Return the numbers of the circuit as it is, rounded to six digits."""
     design = instrument()
     numbers: Numbers = {}
     for measure in (generator, source, receiver, skin_numbers, time_numbers, supply_numbers):
         numbers |= measure(design)
-    numbers |= before()
+    return rounded(numbers)
+
+
+def measure_all() -> Numbers:
+    """Return every number, rounded to six digits."""
+    return measure_now() | measure_before()
+
+
+def rounded(numbers: Numbers) -> Numbers:
+    """Return the numbers with six digits."""
     return {key: float(f"{value:.6g}") for key, value in numbers.items()}

@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[3]
 CLI = pytest.mark.long("tests/python/cli runs these commands one by one")
 SCENES = pytest.mark.long("tests/python/scene")
 TEACHING = pytest.mark.long("teaching/test_guide.py, test_a_whole_session, and test_update.py")
+SINKS = pytest.mark.long("tests/python/sinks and tests/python/robot")
 API = pytest.mark.long("the README's Python, package/test_public.py, the tests of each module")
 PAGES = (
     "README.md",
@@ -28,8 +29,8 @@ PAGES = (
     pytest.param("docs/guide/calibration.md", marks=CLI),
     pytest.param("docs/guide/board.md", marks=CLI),
     pytest.param("docs/guide/gestures.md", marks=CLI),
-    "docs/guide/touches-out.md",
-    "docs/guide/robot.md",
+    pytest.param("docs/guide/touches-out.md", marks=SINKS),
+    pytest.param("docs/guide/robot.md", marks=SINKS),
     pytest.param("docs/guide/your-board.md", marks=CLI),
     pytest.param("docs/reference/python-api.md", marks=API),
     "docs/reference/frames-format.md",

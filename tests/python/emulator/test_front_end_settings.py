@@ -19,6 +19,7 @@ SKINS = {
     "dish of 2 S/m": 0.0077,
     "foil of 50 kohm a square": 5.8,
 }
+EXTREMES = ("the paper's skin", "dish of 2 S/m", "foil of 50 kohm a square")
 PAPER_ROW_OHM, PAPER_DRIVE_OHM = 800.0, 19_000.0
 
 
@@ -64,9 +65,13 @@ def touches(device) -> list[tuple[float, float]]:
     return sorted((touch.x_mm, touch.y_mm) for touch in solved[-1].touches)
 
 
-def test_other_parts_serve_other_skins_without_a_new_image(device, paper):
+@pytest.mark.parametrize(
+    "names", [EXTREMES, pytest.param(tuple(SKINS), marks=pytest.mark.long("the extremes"))]
+)
+def test_other_parts_serve_other_skins_without_a_new_image(device, paper, names):
     places = {}
-    for name, factor in SKINS.items():
+    for name in names:
+        factor = SKINS[name]
         before_skin(device, factor, *paper)
         parts = suitable(Demand(factor * PAPER_ROW_OHM, factor * PAPER_DRIVE_OHM))
         fit(device, parts.current_a, parts.gain)

@@ -117,39 +117,51 @@ def test_everything_in_the_header_is_used():
         )
 
 
-@pytest.mark.parametrize("name", sorted(BASES))
-def test_base(name):
+def test_bases():
+    for name in sorted(BASES):
+        assert_base(name)
+
+
+def assert_base(name: str) -> None:
     known = {**FACTS["bases"], **ADDRESSES}
-    assert BASES[name] == known.get(name, BASES[name])
+    assert BASES[name] == known.get(name, BASES[name]), name
     prefix = next((key for key in PERIPHERALS if name.startswith(key)), None)
     if prefix is None or name == "ADC_COMMON":
         assert name in known, f"{name} is checked against nothing"
         return
-    assert BASES[name] == device(PERIPHERALS[prefix][0]).peripherals[name].base
+    assert BASES[name] == device(PERIPHERALS[prefix][0]).peripherals[name].base, name
 
 
-@pytest.mark.parametrize("name", sorted(REGISTERS))
-def test_register(name):
+def test_registers():
+    for name in sorted(REGISTERS):
+        assert_register(name)
+
+
+def assert_register(name: str) -> None:
     owner, offset = REGISTERS[name]
     fact = FACTS["offsets"].get(name)
-    assert offset == (offset if fact is None else fact)
+    assert offset == (offset if fact is None else fact), name
     if name.startswith(ONLY_HERE):
-        assert fact is not None and owner == f"{name.split('_')[0]}_BASE"
+        assert fact is not None and owner == f"{name.split('_')[0]}_BASE", name
     elif name not in NOT_IN_SVD:
         found = register_of(name)
         assert found is not None, f"{name} is checked against nothing"
-        assert offset == found[1].offset
+        assert offset == found[1].offset, name
         if owner.endswith("_BASE"):  # of the peripheral whose name it bears
             assert owner == (
                 "ADC_COMMON_BASE" if name == "ADC_CCR" else f"{name.split('_')[0]}_BASE"
-            )
+            ), name
 
 
-@pytest.mark.parametrize("name", sorted(BITS | POSITIONS))
-def test_field(name):
+def test_fields():
+    for name in sorted(BITS | POSITIONS):
+        assert_field(name)
+
+
+def assert_field(name: str) -> None:
     bit = (BITS | POSITIONS)[name]
     fact = FACTS["bits"].get(name)
-    assert bit == (bit if fact is None else fact)
+    assert bit == (bit if fact is None else fact), name
     if name.startswith(ONLY_HERE) or name in NOT_IN_SVD:
         assert fact is not None, f"{name} is checked against nothing"
         return
@@ -157,7 +169,7 @@ def test_field(name):
     assert found is not None, f"{name} is checked against nothing"
     field = RENAMED.get(name, name.removeprefix(found[0] + "_"))
     lowest, width = found[1].fields[field]
-    assert bit == lowest
+    assert bit == lowest, name
     assert name in RENAMED or (width == 1) == (name in BITS), f"{field} has {width} bits"
 
 
