@@ -248,6 +248,13 @@
  * a touch; smaller: late */
 #define EITS_FAST_SEED_REACH_MM R(8.0)
 
+/* from scan to scan that a still touch which moves goes at least [mm]. larger: slow fingers lag;
+ * smaller: still touches are dragged */
+#define EITS_FAST_CREEPS_MM R(0.5)
+
+/* on end in which it has gone that far [drives]. as FAST_CREEPS_MM */
+#define EITS_FAST_CREEPS 16
+
 /* end of a disc from which on it is a palm [mm]. between FAST_RHO_WIDE_MM and FAST_RHO_WIDER_MM */
 #define EITS_FAST_PALM_MM R(25.0)
 

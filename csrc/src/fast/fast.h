@@ -51,7 +51,8 @@ typedef struct fast_known {
     fast_last last; /* what the last solved frame said of it, where it had it, and when */
     eits_real place[2];
     uint32_t place_us;
-    eits_real anchor[2]; /* where it was `slow` drives ago */
+    uint32_t creeps;     /* drives on end in which it had gone the same way since the last scan */
+    eits_real anchor[2]; /* where it was `slow` drives ago; of a still one, how far it had gone */
     eits_real energy;    /* mean of what it explains of a drive's chi^2 */
     eits_real peak;      /* its greatest strength */
     eits_real rho2;      /* square of where its soft disc ends, mm^2 */

@@ -314,8 +314,33 @@ static void slow_down(eits_fast *fast, uint32_t k)
         eits_fast_still(fast, k);
 }
 
+/* A still touch that goes the same way from scan to scan moves: it lags behind a finger that is too
+ * slow to be news. It is compared with where the same drive had it, since the model's error shifts
+ * it alike in each scan. `then` is where that was. */
+static void speed_up(eits_fast *fast, uint32_t k, const eits_real *then)
+{
+    fast_known *known = &fast->known[k];
+    eits_real *state = fast->state + FAST_SIZE * k;
+    const eits_real by[2] = {state[FAST_X] - then[FAST_X], state[FAST_Y] - then[FAST_Y]};
+    const eits_real far2 = by[0] * by[0] + by[1] * by[1];
+    const int same = by[0] * known->anchor[0] + by[1] * known->anchor[1] > far2 / 2;
+    const int goes = fast->held_count == 0 && far2 > fast_square(EITS_FAST_CREEPS_MM);
+    known->creeps = goes ? (known->creeps > 0 && same ? known->creeps + 1 : 1) : 0;
+    if (known->creeps <= 1)
+        eits_copy(known->anchor, by, 2);
+    if (known->creeps < EITS_FAST_CREEPS || !(fast->frame_s > 0))
+        return;
+    known->moving = 1;
+    known->slow = known->creeps = 0;
+    for (uint32_t axis = 0; axis < 2; ++axis) {
+        const uint32_t speed = FAST_SIZE * k + FAST_VX + axis;
+        state[FAST_VX + axis] = by[axis] / fast->frame_s;
+        fast->p[speed][speed] = fast_square(EITS_FAST_SPEED_NOISE);
+    }
+}
+
 /* Which touches are on, and which have gone. */
-static void update_known(eits_fast *fast)
+static void update_known(eits_fast *fast, const fast_drive *d, uint32_t there)
 {
     for (uint32_t k = fast->count; k-- > 0;) {
         fast_known *known = &fast->known[k];
@@ -330,6 +355,8 @@ static void update_known(eits_fast *fast)
             known->on = 1;
         known->off_drives = known->on ? 0 : known->off_drives + 1;
         slow_down(fast, k);
+        if (!known->moving && known->on && (there >> k & 1u) != 0)
+            speed_up(fast, k, d->then[k]);
         if (known->off_drives > EITS_FAST_GONE || !eits_fast_on_skin(fast, state, known->rho2) ||
             !eits_all_finite(state, FAST_SIZE))
             eits_fast_drop(fast, k);
@@ -364,13 +391,16 @@ eits_status eits_fast_drive(eits_fast *fast, uint32_t drive, const eits_real *vo
     fast->time_us = time_us;
     fast->timed = fast->driven = 1;
     ++fast->drive_count;
-    for (uint32_t k = 0; k < EITS_FAST_MAX_TOUCHES; ++k)
-        d->there[k] = 0;
     forget_off_skin(fast);
+    uint32_t there = 0; /* the touches that the drive had when it was last measured */
+    for (uint32_t k = 0; k < EITS_FAST_MAX_TOUCHES; ++k) {
+        there |= (uint32_t)(d->there[k] != 0) << k;
+        d->there[k] = 0;
+    }
     const int explained = look(fast, drive, volts);
     d->explained = (uint8_t)explained;
     fast->unexplained = fast->unexplained << 1 | (uint32_t)!explained;
-    update_known(fast);
+    update_known(fast, d, there);
     for (uint32_t k = 0; k < fast->count; ++k) {
         d->there[k] = 1;
         eits_copy(d->then[k], fast->state + FAST_SIZE * k, FAST_WAYS);
