@@ -7,35 +7,31 @@ from pathlib import Path
 
 import numpy as np
 
-from eitskin.view.panels import save_picture
-from eitskin.view.pictures import COLOURS, INK, STYLE, load_matplotlib
+from eitskin.view.pictures import COLOURS
 from eitskin_studies.experiments.homogeneous.cases import IDEAL, MEASURED_TANK, SIMULATED_TANK
 from eitskin_studies.experiments.homogeneous.tables import Row
 from eitskin_studies.experiments.homogeneous.uniformity import deviations_percent
+from eitskin_studies.pictures.style import BLUE, GREEN, GREY, VERMILION, drawing, plain_axes
 
-EVEN, SHOWN, BROKEN, TANK = "#9a9a9a", "#1f5fa8", "#b3261e", "#00796b"
+EVEN, SHOWN, BROKEN, TANK = GREY, BLUE, VERMILION, GREEN
 COLUMNS = 4
 
 
 def draw_waveforms(path: Path, *, rows: Sequence[Row]) -> None:
     """The first session of each case that is told apart by eye, over the skin with nothing uneven,
-    drive by drive, as a PNG.
+    drive by drive.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
     by_name = {row.name: row for row in rows}
     ideal = by_name[IDEAL]
     usual = rows[1]
     pairs = [(ideal, usual, SHOWN), *((ideal, row, BROKEN) for row in rows if row.fault)]
     if MEASURED_TANK in by_name:
         pairs.append((by_name[SIMULATED_TANK], by_name[MEASURED_TANK], TANK))
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(
-            figsize=(11.0, 1.75 * len(pairs) + 0.6), layout="constrained"
-        )
+    with drawing(path, 11.0, 1.75 * len(pairs) + 0.6) as figure:
         for axes, (even, row, colour) in zip(
             np.atleast_1d(figure.subplots(len(pairs), 1, sharex=True)), pairs, strict=True
         ):
@@ -51,9 +47,10 @@ def draw_waveforms(path: Path, *, rows: Sequence[Row]) -> None:
                 axes.plot(scale * values.ravel(), label=one.name, **style)
             drives, positions = row.folded_v.shape[1:]
             for d in range(1, drives):
-                axes.axvline(d * positions - 0.5, color=INK, linewidth=0.3, alpha=0.4)
-            axes.set_ylabel("parts of rms" if tank else "mV")
+                axes.axvline(d * positions - 0.5, color=GREY, linewidth=0.4, alpha=0.5)
+            axes.set_ylabel("voltage / its rms" if tank else "voltage, mV")
             axes.set_xlim(-1, drives * positions)
+            plain_axes(axes, "y")
             axes.legend(
                 loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=2, fontsize=8, frameon=False
             )
@@ -62,21 +59,17 @@ def draw_waveforms(path: Path, *, rows: Sequence[Row]) -> None:
             [str(d) for d in range(drives)],
         )
         axes.set_xlabel(
-            "drive (current into this electrode, out of the next); within each the 13 pairs in turn"
+            "drive: current into the electrode of this number, out of the next one;"
+            " the 13 measuring pairs of each drive from left to right"
         )
-        figure.suptitle("An untouched skin: a U for each drive")
-        save_picture(figure, path)
+        figure.suptitle("Voltages of an untouched skin: one U for each drive")
 
 
 def draw_deviations(path: Path, *, rows: Sequence[Row]) -> None:
     """The first session of each case: each value's distance from the mean over drives, by drive and
     position; raises as above."""
-    matplotlib = load_matplotlib()
     lines = math.ceil(len(rows) / COLUMNS)
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(
-            figsize=(3.0 * COLUMNS, 2.55 * lines + 0.6), layout="constrained"
-        )
+    with drawing(path, 3.0 * COLUMNS, 2.55 * lines + 0.6) as figure:
         axes = figure.subplots(lines, COLUMNS, squeeze=False).ravel()
         for here, row in zip(axes, rows, strict=False):
             shown = deviations_percent(row.folded_v[0])
@@ -95,10 +88,9 @@ def draw_deviations(path: Path, *, rows: Sequence[Row]) -> None:
             bar.set_label("%", rotation=0, labelpad=2)
         for here in axes[len(rows) :]:
             here.set_axis_off()
-        figure.supxlabel("measuring pair, electrodes on from the drive")
+        figure.supxlabel("measuring pair, counted in electrodes from the drive")
         figure.supylabel("drive")
         figure.suptitle(
             "Distance of each of the 208 values from the mean over drives; each panel has its own"
             " scale"
         )
-        save_picture(figure, path)
