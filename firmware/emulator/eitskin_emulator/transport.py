@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from eitskin.device.bank import bank_bytes
+from eitskin.device.simulated import check_prebuilt_fits
 from eitskin.device.transport import Capabilities, SimulatedScene, Transport
 from eitskin.errors import DeviceError
 from eitskin.model.eitm import decode_model
@@ -127,10 +128,13 @@ def open_emulated(
         MissingExtraError: what simulates the scene is not installed.
         FileError, ConfigError, GeometryError, ProtocolError: scene or image cannot be read, or the
             model is for other electrodes.
+        UsageError: the scene's skin covers a surface, and there is no model of it.
         ModelError, DeviceError: the model is none, or too long; the image is none.
     """
     program = image_bytes(image)
     described = find_scene(scene)
+    if model is None:
+        check_prebuilt_fits(described)
     prebuilt, blob = load_prebuilt() if model is None else (decode_model(model, "the model"), model)
     banks = (bank_bytes(blob, 1),)
     board = EmulatedBoard(program, skin_of(described, prebuilt.protocol), banks)

@@ -14,8 +14,10 @@ import numpy as np
 from eitskin.device.bank import BANK_BYTES, ERASED, bank_bytes
 from eitskin.device.host_board import HostBoard
 from eitskin.device.transport import Capabilities, SimulatedScene, Transport
+from eitskin.errors import UsageError
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.scene.board_frames import BoardFrames
+from eitskin.scene.description import Scene
 from eitskin.scene.laws import ShortCircuit
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.random_touches import TrueTouch
@@ -153,15 +155,33 @@ class SimTransport(Transport):
         """Nothing is held."""
 
 
+def check_prebuilt_fits(scene: Scene) -> None:
+    """Reject a scene on a surface if its board has the prebuilt model, which is of a flat skin.
+
+    Raises:
+        UsageError: the scene's skin covers a surface.
+    """
+    if scene.skin.surface is not None:
+        raise UsageError(
+            f"{scene.where}: its skin {scene.skin.name!r} covers a surface, and the prebuilt model"
+            " is of a flat skin; build its model with  eitskin model build  and name it with"
+            " --model (in a robot file: model)"
+        )
+
+
 def open_simulated(scene: str, *, model: bytes | None = None, loop: bool = False) -> SimTransport:
     """A simulated board before ``scene`` (a file or a library scene), with ``model`` in its first
     bank (or the prebuilt one).
 
     Raises:
         FileError, ConfigError, GeometryError, ProtocolError: the scene cannot be read.
+        UsageError: its skin covers a surface, and there is no model of it.
         DeviceError: the model does not fit a bank.
     """
-    frames = BoardFrames(find_scene(scene))
+    described = find_scene(scene)
+    if model is None:
+        check_prebuilt_fits(described)
+    frames = BoardFrames(described)
     blob = load_prebuilt()[1] if model is None else model
     empty = bytes([ERASED]) * BANK_BYTES
     return SimTransport(scene, SimBoard(frames, [bank_bytes(blob, 1), empty]), loop=loop)

@@ -1,7 +1,7 @@
 """Touches on curved surfaces: shapes that unroll and shapes that do not, and a forearm that
 flexes."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -15,12 +15,13 @@ from eitskin.model.eitm import load_model, save_model
 from eitskin.scene.simulate import Measurement, measure
 from eitskin.scene.streams import stream
 from eitskin.scoring.matching import match
-from eitskin.skin.protocol import adjacent
+from eitskin.skin.protocol import adjacent, pattern
 from eitskin.skin.skin import Skin
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.surface.outline import surface_map
 from eitskin.surface.shapes import disk_net, flexed_forearm
 from eitskin.surface.surface_map import SurfaceMap
+from eitskin_studies.experiments.electrodes.patterns import from_transfer, transfer
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
 from eitskin_studies.experiments.multitouch.counts import share
 from eitskin_studies.experiments.surfaces.scenes import (
@@ -37,6 +38,7 @@ from eitskin_studies.experiments.surfaces.scenes import (
     shape_map,
     size_of,
     skin_on,
+    slopes_v,
     solved,
 )
 from eitskin_studies.harness.sessions import converter_for
@@ -46,6 +48,7 @@ TITLE = "Touches on curved surfaces, and on a forearm that flexes"
 USUAL, SNR_DB, SAMPLES = 20, 60.0, 200
 CURVED = ("hemisphere", "saddle", "fingertip", "forearm")
 UNROLLED = ("cylinder", "cone")
+MANY, COMPARED, DRIVES = 60, ("flat disk", "forearm"), ("adjacent", "opposite")
 GATE_MM = 10.0  # of a skin of 194 mm
 BULGES_MM = (6.0, 9.0, 12.0)
 CAPS_DEG = (60, 90, 120, 150, 165)
@@ -54,28 +57,38 @@ PROTOCOL = adjacent(ELECTRODES)
 
 def run(workspace: Workspace) -> ExperimentOutcome:
     """All of it; what the workspace has kept is not computed again."""
-    steps: list[tuple[str, Any]] = [("flat disk", partial(_flat, workspace))]
+    steps: list[tuple[str, Any]] = [("flat disk", partial(_surface, workspace, "flat disk"))]
     steps += [(name, partial(_unrolled, workspace, name)) for name in UNROLLED]
-    steps += [(name, partial(_curved, workspace, name)) for name in CURVED]
+    steps += [(name, partial(_surface, workspace, name)) for name in CURVED]
     steps += [("flexed", partial(_flexed, workspace))]
-    count = workspace.settings.count(USUAL)
+    steps += [(f"many {name}", partial(_many, workspace, name)) for name in COMPARED]
+    settings = workspace.settings
     scores: dict[str, Any] = {}
     for name, step in workspace.progress(steps, "surfaces"):
-        facts = {"part": name, "scenes": count, "samples": SAMPLES}
+        scenes = settings.count(MANY if name.startswith("many ") else USUAL)
+        facts = {"part": name, "scenes": scenes, "samples": SAMPLES}
         scores[name] = workspace.kept(facts, step)
     flexed = scores.pop("flexed")
+    many = {name: scores.pop(f"many {name}") for name in COMPARED}
     caps = [_cap(angle) for angle in CAPS_DEG]
-    seed = workspace.settings.seed
+    count, many_count, seed = settings.count(USUAL), settings.count(MANY), settings.seed
     words = (
-        f"{count} scenes of 1 to 3 discs per surface, seed {seed}, {SNR_DB:g} dB, 12 bits, contacts"
-        f" spread by 20 %, {ELECTRODES} electrodes along the rim. Radii of 6 to 12 mm, gaps and"
-        " electrodes are those of the flat skin of 194 mm, scaled to the surface's size. Models"
-        f" are built from {MODEL_TRIANGLES} triangles with {SAMPLES} random skins; frames come from"
-        f" another triangulation of about {SCENE_TRIANGLES} triangles, flattened by itself."
+        f"{count} scenes of 1 to 3 discs per surface, and {many_count} where more are compared,"
+        f" seed {seed}, {SNR_DB:g} dB, 12 bits, contacts spread by 20 %, {ELECTRODES} electrodes"
+        " along the rim. Radii of 6 to 12 mm, gaps and electrodes are those of the flat skin of 194"
+        f" mm, scaled to the surface's size. Models are built from {MODEL_TRIANGLES} triangles with"
+        f" {SAMPLES} random skins; frames come from another triangulation of about"
+        f" {SCENE_TRIANGLES} triangles, flattened by itself."
     )
     return ExperimentOutcome(
-        (_table(scores), _zones(scores["hemisphere"]), _caps(caps), _flex_table(flexed)),
-        {"scores": scores, "flexed": flexed, "caps": caps},
+        (
+            _table(scores),
+            _zones(scores["hemisphere"]),
+            _many_table(many),
+            _caps(caps),
+            _flex_table(flexed),
+        ),
+        {"scores": scores, "many": many, "flexed": flexed, "caps": caps},
         {},
         {"sets": words},
     )
@@ -101,6 +114,11 @@ def _converter(tare_v: FloatArray) -> tuple[float, float]:
     how = converter_for(SNR_DB)
     span_v = how.adc_headroom * float(np.abs(tare_v).max())
     return 2 * span_v / 2 ** (how.adc_bits or 12), span_v
+
+
+def _sigma_v(tare_v: FloatArray) -> float:
+    """The deviation of noise and converter in V."""
+    return float(np.hypot(noise_deviation_v(tare_v, SNR_DB), _converter(tare_v)[0] / 12**0.5))
 
 
 def _found(
@@ -160,10 +178,25 @@ def _scored(
     }
 
 
-def _flat(workspace: Workspace) -> dict[str, Any]:
-    surface = shape_map("cylinder", MODEL_TRIANGLES)
-    skin, plane = _unwrapped("flat disk", skin_on("cylinder", surface)), flat_map(surface)
-    return _judged(workspace, skin, plane, skin, plane)
+@dataclass(frozen=True, eq=False)
+class Skins:
+    """A skin and its surface as the model has them, and as they are: another triangulation."""
+
+    skin: Skin
+    surface: SurfaceMap
+    true_skin: Skin
+    fine: SurfaceMap
+
+
+def _skins(name: str) -> Skins:
+    """The skin on the surface ``name``, or on the flat disk, which is the same for both."""
+    if name == "flat disk":
+        surface = shape_map("cylinder", MODEL_TRIANGLES)
+        skin, plane = _unwrapped(name, skin_on("cylinder", surface)), flat_map(surface)
+        return Skins(skin, plane, skin, plane)
+    surface, fine = shape_map(name, MODEL_TRIANGLES), shape_map(name, SCENE_TRIANGLES)
+    skin = skin_on(name, surface)
+    return Skins(skin, surface, same_on(name, fine, skin), fine)
 
 
 def _unwrapped(name: str, skin: Skin) -> Skin:
@@ -171,47 +204,62 @@ def _unwrapped(name: str, skin: Skin) -> Skin:
     return replace(skin, name=name, surface=None)
 
 
-def _curved(workspace: Workspace, name: str) -> dict[str, Any]:
+def _surface(workspace: Workspace, name: str) -> dict[str, Any]:
     """Surfaces that unroll have the bound of the flat disk."""
-    surface, fine = shape_map(name, MODEL_TRIANGLES), shape_map(name, SCENE_TRIANGLES)
-    skin, bounded = skin_on(name, surface), name not in UNROLLED
-    return _judged(workspace, skin, surface, same_on(name, fine, skin), fine, bounded)
+    count = workspace.settings.count(USUAL)
+    return _judged(workspace, _skins(name), count, bounded=name not in UNROLLED)
 
 
-def _judged(
-    workspace: Workspace,
-    skin: Skin,
-    surface: SurfaceMap,
-    true_skin: Skin,
-    fine: SurfaceMap,
-    bounded: bool = True,
-) -> dict[str, Any]:
-    settings = workspace.settings
-    drawn = draw_touches(fine, settings.seed, "surfaces", settings.count(USUAL))
+def _drawn(workspace: Workspace, skins: Skins, count: int) -> list[list[SpaceTouch]]:
+    return draw_touches(skins.fine, workspace.settings.seed, "surfaces", count)
+
+
+def _judged(workspace: Workspace, skins: Skins, count: int, bounded: bool) -> dict[str, Any]:
+    drawn, fine = _drawn(workspace, skins, count), skins.fine
     scenes = [on_copy(fine, one) for one in drawn]
-    model = SolvedSurface(true_skin, PROTOCOL, _contacts(workspace, skin))
+    model = SolvedSurface(skins.true_skin, PROTOCOL, _contacts(workspace, skins.skin))
     quiet, frames = model.voltages(()), np.array([model.voltages(one) for one in scenes])
     found = _found(
-        _model(workspace, skin), {"quiet": quiet, "frames": frames}, quiet, settings.seed
+        _model(workspace, skins.skin),
+        {"quiet": quiet, "frames": frames},
+        quiet,
+        workspace.settings.seed,
     )
-    score = _scored(drawn, found, surface)
+    score = _scored(drawn, found, skins.surface)
     if not bounded:
         return score
-    sigma_v = float(np.hypot(noise_deviation_v(quiet, SNR_DB), _converter(quiet)[0] / 12**0.5))
     places = [(one.x_mm, one.y_mm) for scene in scenes for one in scene]
     return score | {
-        "bound_mm": bounds_mm(model, fine, scenes, sigma_v),
+        "bound_mm": bounds_mm(slopes_v(model, fine, scenes), fine, scenes, _sigma_v(quiet)),
         "true_scales": fine.at(places).scale.tolist(),
     }
+
+
+def _many(workspace: Workspace, name: str) -> dict[str, Any]:
+    """More scenes, because medians over few touches are uncertain, and the bounds with other
+    drives. The voltages of all drives are combinations of those of neighbours."""
+    skins, count = _skins(name), workspace.settings.count(MANY)
+    score = _judged(workspace, skins, count, bounded=False)
+    scenes = [on_copy(skins.fine, one) for one in _drawn(workspace, skins, count)]
+    model = SolvedSurface(
+        skins.true_skin, transfer(ELECTRODES), _contacts(workspace, skins.true_skin)
+    )
+    quiet, slopes = model.voltages(()), slopes_v(model, skins.fine, scenes)
+    bounds = {}
+    for drive in DRIVES:
+        protocol = pattern(ELECTRODES, drive)
+        rows = [np.asarray(from_transfer(one, protocol)) for one in slopes]
+        sigma_v = _sigma_v(np.asarray(from_transfer(quiet, protocol)))
+        bounds[drive] = bounds_mm(rows, skins.fine, scenes, sigma_v)
+    return score | {"bounds_mm": bounds}
 
 
 def _unrolled(workspace: Workspace, name: str) -> dict[str, Any]:
     """The same touches on the flat copy and wrapped: places and counts are compared one by one.
     Both have the same outline and electrodes, so their meshes differ by the wrapping alone."""
-    settings, score = workspace.settings, _curved(workspace, name)
-    surface, fine = shape_map(name, MODEL_TRIANGLES), shape_map(name, SCENE_TRIANGLES)
-    skin = skin_on(name, surface)
-    true_skin = same_on(name, fine, skin)
+    settings, score = workspace.settings, _surface(workspace, name)
+    skins = _skins(name)
+    skin, true_skin, fine = skins.skin, skins.true_skin, skins.fine
     flat_name = "flat disk" if name == "cylinder" else f"flat {name}"
     drawn = draw_touches(flat_map(fine), settings.seed, "unrolled", settings.count(USUAL))
     scenes = [on_copy(flat_map(fine), one) for one in drawn]
@@ -331,6 +379,36 @@ def _zones(score: dict[str, Any]) -> Table:
         medians = [_mm(float(np.median(one)) if len(one) else None) for one in (own, least)]
         rows.append((f"{low:g} to {min(high, 2.0):g}", str(len(own)), *medians))
     return Table("zones", ("scale", "touches", "median, mm", "bound, mm"), tuple(rows))
+
+
+def _many_table(many: dict[str, dict[str, Any]]) -> Table:
+    """Medians over the size, and their ratios to the flat disk's, of errors and bounds."""
+
+    def relative(name: str, kind: str) -> FloatArray:
+        one = many[name]
+        values = one["far_mm"] if kind == "error" else one["bounds_mm"][kind]
+        return np.asarray(np.array(values) / one["size"], dtype=np.float64)
+
+    rows = []
+    for name, one in many.items():
+        cells = [name, _percent(one), str(len(one["far_mm"])), _mm(one["median_mm"])]
+        for kind in ("error", *DRIVES):
+            middle, low, high = _ratio(relative(name, kind), relative("flat disk", kind))
+            cells.append("" if name == "flat disk" else f"{middle:.2f} ({low:.2f} to {high:.2f})")
+        rows.append(tuple(cells))
+    head = ("surface", "exact (95 %)", "touches", "median, mm",
+            "median over size, to the flat disk's (95 %)",
+            *(f"the same of the bound, {drive} drives (95 %)" for drive in DRIVES))  # fmt: skip
+    return Table("many", head, tuple(rows))
+
+
+def _ratio(above: FloatArray, below: FloatArray) -> tuple[float, float, float]:
+    """The ratio of two medians, and the ends of its interval of 95 %, by drawing the touches again
+    (bootstrap)."""
+    draw = np.random.default_rng(1)
+    drawn = [np.median(draw.choice(one, (2000, len(one))), axis=1) for one in (above, below)]
+    low, high = np.quantile(drawn[0] / drawn[1], (0.025, 0.975))
+    return float(np.median(above) / np.median(below)), float(low), float(high)
 
 
 def _caps(caps: list[dict[str, Any]]) -> Table:

@@ -152,20 +152,30 @@ def solved(
     return {"quiet": model.voltages(()), "frames": np.array(frames)}
 
 
+def slopes_v(
+    model: SolvedSurface, surface: SurfaceMap, scenes: list[tuple[TrueTouch, ...]]
+) -> list[FloatArray]:
+    """The slopes (p, m) of the voltages of each scene by the parameters of its touches: differences
+    over BOUND_STEPS, which are so wide that the mesh does not matter."""
+    size, (x_mm, y_mm, *others) = size_of(surface), BOUND_STEPS
+    steps = (size * x_mm, size * y_mm, *others)
+    return [touch_slopes_v(model, scene, steps) for scene in scenes]
+
+
 def bounds_mm(
-    model: SolvedSurface, surface: SurfaceMap, scenes: list[tuple[TrueTouch, ...]], sigma_v: float
+    slopes: Sequence[FloatArray],
+    surface: SurfaceMap,
+    scenes: list[tuple[TrueTouch, ...]],
+    sigma_v: float,
 ) -> list[float]:
-    """The median error in mm on ``surface`` of each touch of ``scenes`` that the Cramer-Rao bound
-    allows for one frame with noise ``sigma_v`` (``benchmarks.limit_bound``; contacts count as
-    known). Slopes are differences over BOUND_STEPS, which are so wide that the mesh does not
-    matter."""
-    size, found = size_of(surface), []
-    x_mm, y_mm, *others = BOUND_STEPS
-    for scene in scenes:
-        slopes = touch_slopes_v(model, scene, (size * x_mm, size * y_mm, *others)) / sigma_v
+    """The median error in mm on ``surface`` of each touch of ``scenes``, whose slopes are
+    ``slopes_v``, that the Cramer-Rao bound allows for one frame with noise ``sigma_v``
+    (``benchmarks.limit_bound``; contacts count as known)."""
+    found = []
+    for scene, own in zip(scenes, slopes, strict=True):
         scales = surface.at([[one.x_mm, one.y_mm] for one in scene]).scale
         found += [
             scale * one.median_mm
-            for scale, one in zip(scales.tolist(), bounds_of(slopes, scene), strict=True)
+            for scale, one in zip(scales.tolist(), bounds_of(own / sigma_v, scene), strict=True)
         ]
     return found

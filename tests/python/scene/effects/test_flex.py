@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from eitskin.errors import ConfigError
+from eitskin.device.open import open_device
+from eitskin.errors import ConfigError, UsageError
 from eitskin.fem.cem import ForwardModel
 from eitskin.fem.mesh import lifted
 from eitskin.scene.compiler import MeshCache, compile_scene
@@ -137,3 +138,10 @@ def test_a_scene_without_it_costs_nothing(folder):
     assert done.returncode == 0, done.stderr
     used, factorisations, states = json.loads(done.stdout)
     assert used == [] and factorisations <= states == 2
+
+
+@pytest.mark.parametrize("kind", ["sim", "emu"])
+def test_a_board_before_a_surface_needs_a_model_of_it(folder, kind):
+    """The prebuilt model is of a flat skin, so its touches would be nonsense."""
+    with pytest.raises(UsageError, match=r"covers a surface.*--model"):
+        open_device(f"{kind}:{folder / 'scene.toml'}")
