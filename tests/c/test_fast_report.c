@@ -111,6 +111,22 @@ TEST(a_followed_touch_is_what_was_found_near_it)
     CHECK_EQUAL(report(NULL, 0), 0); /* the report of a frame is made once */
 }
 
+/* What drives follow lags behind a finger in noise. A wide contact is several touches to the
+ * solver: it stays where drives have it. */
+TEST(where_the_two_differ_the_frame_is_shown)
+{
+    const eits_fast_touch finger = {.id = 3, .strength_s_per_m_mm2 = 1, .radius_mm = 7};
+    const eits_fast_touch palm = {.id = 3, .strength_s_per_m_mm2 = 1, .radius_mm = 25};
+    const eits_touch found = at(12, 0, 0.5);
+    set_up();
+    drives_follow(&finger, 1);
+    CHECK_EQUAL(report(&found, 1), 1);
+    CHECK(t[0].id == 3 && t[0].x_mm == 12 && t[0].explained > 0 && t[0].confirmed == 0);
+    drives_follow(&palm, 1);
+    CHECK_EQUAL(report(&found, 1), 1);
+    CHECK(t[0].id == 3 && t[0].x_mm == 0 && t[0].explained == 0);
+}
+
 /* A touch that no drive follows counts from its second frame on, however clear it is. A frame that
  * was not solved is none, and nothing is held. */
 TEST(a_touch_beside_those_of_drives)

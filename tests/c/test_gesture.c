@@ -364,6 +364,46 @@ TEST(a_held_touch_and_a_lost_frame_do_not_end_a_hold)
     ENDS("2 down, 2 up, hold");
 }
 
+/* A frame of which noise took a part, then one that was not solved: drives show the finger. */
+TEST(a_finger_that_only_drives_show_stays_down)
+{
+    const eits_touch noisy = faint(1, 5, 5, 3, 0.6), driven = faint(1, 9, 5, 3, 0),
+                     fading = faint(1, 8, 5, 1, 0);
+    begin();
+    finger(1, 5, 5, 0, 0, 4);
+    for (int k = 0; k < 3; ++k) {
+        frame(&noisy, 1);
+        frame(&driven, 1);
+    }
+    REPORTS("down");
+    CHECK_EQUAL(b.moves, 0);
+    frame(&noisy, 1);
+    frame(&fading, 1); /* and now it lifts */
+    REPORTS("down, up, tap");
+}
+
+/* Single frames lack a light finger in noise; how uncertain its place is tells so. */
+TEST(an_uncertain_finger_has_time_to_come_back)
+{
+    static const struct {
+        double variance_mm2;
+        int missed;
+        const char *reported;
+    } cases[] = {
+        {1, 1, "2 down, up, tap"}, {3, 1, "down"}, {3, 2, "down"}, {3, 3, "2 down, up, tap"}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        eits_touch t = touch(1, 5, 5);
+        t.x_variance_mm2 = t.y_variance_mm2 = (eits_real)cases[k].variance_mm2;
+        begin();
+        for (int n = 0; n < 8; ++n)
+            frame(&t, 1);
+        none(cases[k].missed);
+        for (int n = 0; n < 8; ++n)
+            frame(&t, 1);
+        REPORTS(cases[k].reported);
+    }
+}
+
 TEST(a_tap_that_is_found_again_is_reported_once)
 {
     begin();

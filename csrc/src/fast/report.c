@@ -224,10 +224,11 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
         const eits_fast_touch *t = &fast->followed[k];
         const eits_real place[2] = {t->x_mm, t->y_mm};
         const uint32_t n = nearest(place, (const eits_real(*)[2])at, taken, count);
-        /* further away, one of the two is wrong: drives know what changes within a frame */
         const int agrees =
             n < count && fast_distance2(at[n], place) < fast_square(EITS_FAST_AGREE_MM);
-        touches[k] = agrees ? found[n] : alone(fast, t);
+        /* where the two differ, the frame's place is the better one; but of a palm it has discs */
+        const int palm = fast_is_palm(fast_square(EITS_FAST_SOFT_RADIUS * t->radius_mm));
+        touches[k] = agrees || (n < count && !palm) ? found[n] : alone(fast, t);
         touches[k].id = t->id;
         touches[k].confirmed = agrees || t->confirmed;
         if (n < count)

@@ -14,6 +14,15 @@
  * reported a frame later; smaller: a lost frame at 96 frames a second ends a touch */
 #define EITS_LOST_US 20000
 
+/* the place of a finger is uncertain if its standard deviation was larger than this when it was
+ * last found [mm]. larger: light fingers lift and land again in noise; smaller: as VAGUE_LOST
+ * larger */
+#define EITS_VAGUE_MM R(2.0)
+
+/* such a finger has lifted if it is not found for this long [lost_us]. larger: lifts of light
+ * fingers in noise are reported late; smaller: single frames end them */
+#define EITS_VAGUE_LOST 3
+
 /* a finger that is found again within this time, and near, is the same [us]. larger: a fast double
  * tap is one; smaller: a lost frame makes two */
 #define EITS_REJOIN_US 45000

@@ -63,6 +63,14 @@ eits_status eits_gestures_init(eits_gestures *gestures, const eits_gesture_optio
 
 /* ---- which is which ---- */
 
+/* Returns 1 if the tracker repeats the touch as the contact last had it, because no frame and no
+ * drive has shown it since. A touch that the frame lacks and drives follow is not held: its place
+ * changes with every drive. */
+static int is_held(const eits_contact *c, const eits_touch *touch)
+{
+    return !(touch->explained > 0) && touch->x_mm == c->seen_x_mm && touch->y_mm == c->seen_y_mm;
+}
+
 /* Returns 1 if a touch may still belong to this contact.
  *
  * A contact that lifted may come back within rejoin_us, but only by a touch that was found in the
@@ -138,8 +146,11 @@ static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch
         const int going = !firm || touch->explained < EITS_GOING * c->explained;
         c->flags = going ? c->flags | CONTACT_GOING : c->flags & ~(uint32_t)CONTACT_GOING;
         c->explained = touch->explained;
-    } else if ((c->flags & CONTACT_GOING) != 0) {
-        return; /* the tracker holds it, but it was lifting: it has lifted */
+        const int vague =
+            touch->x_variance_mm2 + touch->y_variance_mm2 > EITS_VAGUE_MM * EITS_VAGUE_MM;
+        c->flags = vague ? c->flags | CONTACT_VAGUE : c->flags & ~(uint32_t)CONTACT_VAGUE;
+    } else if (!firm || ((c->flags & CONTACT_GOING) != 0 && is_held(c, touch))) {
+        return; /* it was lifting, and no frame shows it any more: it has lifted */
     }
     c->touch_id = touch->id;
     c->seen_us = g->time_us;
@@ -331,12 +342,16 @@ static void end_lost(eits_gestures *g, event_list *out)
     for (uint32_t k = 0; k < EITS_MAX_CONTACTS; ++k) {
         eits_contact *c = &g->contact[k];
         const uint32_t since_us = g->time_us - c->seen_us;
+        /* noise hides a finger whose place is uncertain in single frames: it has time to come back
+         */
+        const uint32_t lost_us =
+            g->options.lost_us * ((c->flags & CONTACT_VAGUE) != 0 ? EITS_VAGUE_LOST : 1u);
         if ((c->flags & CONTACT_SEEN) != 0 || (c->state == CONTACT_DOWN && is_renamed(g, c)))
             continue;
-        if (c->state == CONTACT_DOWN && since_us >= g->options.lost_us) {
+        if (c->state == CONTACT_DOWN && since_us >= lost_us) {
             lift(g, k, out);
             eits_lifted(g, c, out);
-        } else if ((c->state == CONTACT_NEW && since_us >= g->options.lost_us) ||
+        } else if ((c->state == CONTACT_NEW && since_us >= lost_us) ||
                    (c->state == CONTACT_LIFTED && since_us > g->options.rejoin_us)) {
             c->state = CONTACT_NONE;
         }

@@ -166,6 +166,8 @@ class Gestures:
             to = self._touches[count]
             to.id, to.x_mm, to.y_mm = touch.id, touch.x_mm, touch.y_mm
             to.strength_s_per_m_mm2, to.explained = touch.strength_s_per_m_mm2, touch.explained
+            to.x_variance_mm2 = touch.x_variance_mm2 or 0.0
+            to.y_variance_mm2 = touch.y_variance_mm2 or 0.0
             count += 1
         self._lib.eits_gestures_update(
             self._state,
