@@ -168,15 +168,16 @@ class PageServer:
 
     def _news(self, kind: str, facts: dict[str, Any]) -> None:
         failed = kind == "state" and facts["state"] == "failed"
-        if failed and self.reader.frames == 0:
-            self.stop()
+        at_once = failed and self.reader.frames == 0
+        if at_once:
+            self.stop()  # ``serve`` raises the error
         if kind == "state" and facts["state"] == "live":
             self._call(self._send_setup)
         text = text_of(kind, **facts)
         self._call(self._send_setup if kind == "setup" else lambda: self.hub.tell(text))
         if kind == "notice":
             self._say(str(facts["text"]))
-        elif failed or (kind == "state" and facts["text"]):
+        elif not at_once and (failed or (kind == "state" and facts["text"])):
             self._say(f"{facts['state']}: {facts['text']}")
 
     # ---- in the loop ----

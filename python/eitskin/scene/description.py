@@ -166,6 +166,8 @@ def load_scene(path: str | Path) -> Scene:
     """
     path = Path(path)
     table = load_toml(path, "scene")
+    if not table:
+        raise ConfigError(f"{path}: empty, so not a scene; it needs at least the table [scene]")
     return scene_from_table(table, str(path), path.parent, path.read_text(encoding="utf-8"))
 
 

@@ -40,6 +40,7 @@ FILES = {
     "notes.eit": "hello\n",
     "full.csv": "\n".join([",".join(["0.5"] * 208)] * 4),
     "empty.csv": "",
+    "nothing.toml": "",
     "layout.toml": "[lines]\nofset = 3\n",
     "ofs.toml": '[lines]\noffset = "mid"\n',
     "ring.svg": '<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm"'

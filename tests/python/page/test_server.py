@@ -284,6 +284,12 @@ def test_other_hosts_without_a_token(capsys, tmp_path):
     assert "cannot listen" in refused(capsys, 2, "--host", "no.such.host.invalid", "--token", TOKEN)
 
 
+def test_what_keeps_it_from_starting_is_said_once(capsys):
+    assert main(["view", "--port", "0", "--device", "sim:none.toml"]) == 3
+    said = capsys.readouterr().err
+    assert said.count("none.toml: no such scene") == 1 and "Traceback" not in said
+
+
 def test_the_command_says_where_and_ends_by_the_keyboard(scene, tmp_path):
     command = [sys.executable, "-c", INTERRUPTIBLE, "view", "--device", f"sim:{scene}?loop=1"]
     command += ["--port", "0", "--token", "a-word-for-tests", "--to", f"csv:{tmp_path}/t.csv"]
