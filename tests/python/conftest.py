@@ -18,8 +18,8 @@ from margins import (  # noqa: F401
 
 # The files that take longest, first: two workers that share the files then end together.
 LONGEST = (
-    "emulated/test_same_bits.py", "teaching/test_teach.py", "page/test_in_a_browser.py",
-    "solve/test_reconstructor.py", "model/test_model_errors.py", "teaching/test_update.py",
+    "emulated/test_same_bits.py", "docs/test_code_blocks.py", "teaching/test_teach.py",
+    "page/test_in_a_browser.py", "model/test_model_errors.py", "teaching/test_update.py",
     "hard_cases/test_columns.py", "model/test_build.py", "fem/test_cem.py",
     "cli/test_cli_model.py", "fem/test_mesh.py", "frames/test_doctor.py",
     "emulator/test_emulated_board.py", "hardware/test_spice.py", "hardware/test_stages.py",
