@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from eitskin.surface.shapes import flexed_forearm
-from eitskin_studies.experiments.surfaces import _cap, _scored
+from eitskin_studies.experiments.surfaces import _cap, _many_table, _scored
 from eitskin_studies.experiments.surfaces.scenes import (
     GAP_MM,
     MARGIN_MM,
@@ -58,3 +58,18 @@ def test_a_flexed_forearm_is_longer_around_and_a_deep_cap_has_a_great_scale():
     rest, flexed = (flexed_forearm(600, bulge)[0] for bulge in (6.0, 12.0))
     assert 4 < np.linalg.norm(flexed - rest, axis=1).max() < 8
     assert _cap(60)["scale"] == pytest.approx(2 / (1 + np.cos(np.radians(60))), rel=0.02)
+
+
+def test_ratios_of_medians_over_the_size_have_intervals():
+    """The forearm is twice as large, and its errors are three times the flat disk's."""
+    counts = {"exact": 9, "scenes": 10, "median_mm": 0.1}
+    errors = np.linspace(0.05, 0.15, 41)
+    bounds = {"adjacent": errors.tolist(), "opposite": np.full(41, 0.1).tolist()}
+    flat = {**counts, "size": 1.0, "far_mm": errors.tolist(), "bounds_mm": bounds}
+    wide = {kind: [3 * value for value in values] for kind, values in bounds.items()}
+    forearm = {**counts, "size": 2.0, "far_mm": wide["adjacent"], "bounds_mm": wide}
+    first, second = _many_table({"flat disk": flat, "forearm": forearm}).rows
+    assert first[2] == "41" and first[4:] == ("", "", "")
+    low, high = (float(word) for word in second[4][6:-1].split(" to "))
+    assert second[4].startswith("1.50 (") and 1.0 < low < 1.5 < high < 2.0
+    assert second[5] == second[4] and second[6] == "1.50 (1.50 to 1.50)"
