@@ -51,13 +51,16 @@ static uint32_t none(void)
     return report(t, 0);
 }
 
-/* As after eits_fast_align: drives follow these. */
+/* As eits_fast_align does it: drives follow these. */
 static void drives_follow(const eits_fast_touch *touches, uint32_t count)
 {
-    fast->aligned = fast->driven = 1;
-    fast->n_followed = count;
-    for (uint32_t k = 0; k < count; ++k)
+    fast->aligned = 1;
+    fast->count = fast->n_followed = count;
+    for (uint32_t k = 0; k < count; ++k) {
         fast->followed[k] = touches[k];
+        fast->known[k].id = touches[k].id;
+    }
+    eits_fast_expect_touches(fast);
 }
 
 TEST(wrong_arguments)
@@ -136,7 +139,7 @@ TEST(a_touch_beside_those_of_drives)
     for (int frame = 0; frame < 6; ++frame) {
         drives_follow(NULL, 0);
         CHECK_EQUAL(report(&found, 1), frame > 0);
-        CHECK(frame == 0 || (t[0].id == EITS_FAST_FRAME_IDS + 1 && t[0].confirmed == 1));
+        CHECK(frame == 0 || (t[0].id == 1 && t[0].confirmed == 1));
         drives_follow(NULL, 0);
         CHECK_EQUAL(report(NULL, 0), 0);
     }
@@ -144,24 +147,106 @@ TEST(a_touch_beside_those_of_drives)
     CHECK_EQUAL(report(&clear, 1), 0);
 }
 
-/* Ids of drives begin after those that frames have given. */
-TEST(ids_are_given_once)
+/* All touches have one sequence of ids: what drives give birth to follows what frames have named.
+ */
+TEST(ids_are_one_sequence)
 {
+    const eits_real here[2] = {0, 0}, there[2] = {40, 0};
     set_up();
     CHECK_EQUAL(one(0, 0.5), 1);
-    CHECK_EQUAL(fast->next_id, 1);
-    (void)eits_fast_begin(fast);
-    CHECK_EQUAL(fast->next_id, 2);
-    fast->driven = 1;
+    CHECK_EQUAL(t[0].id, 1);
+    drives_follow(NULL, 0);
+    CHECK_EQUAL(eits_fast_id_at(fast, there), 2);
     CHECK_EQUAL(one(0, 0.5), 1); /* still the same touch */
     CHECK_EQUAL(t[0].id, 1);
+    CHECK_EQUAL(eits_fast_id_at(fast, here), 1); /* now drives have found it, */
+    CHECK_EQUAL(eits_fast_id_at(fast, here), 3); /* and what comes later is another */
     eits_fast_forget_all(fast);
     CHECK_EQUAL(one(0, 0.5), 1);
-    CHECK_EQUAL(t[0].id, EITS_FAST_FRAME_IDS + 2);
-    fast->seen_ids = UINT32_MAX - EITS_FAST_FRAME_IDS - 1;
+    CHECK_EQUAL(t[0].id, 4);
+    fast->next_id = EITS_FAST_IDS;
     eits_touch four[4] = {at(-50, 50, 0.5), at(50, 50, 0.5), at(-50, -50, 0.5), at(50, -50, 0.5)};
     CHECK_EQUAL(report(four, 4), 4);
-    CHECK(t[0].id == UINT32_MAX && t[1].id == 1 && t[2].id == 2); /* never 0 */
+    CHECK(t[0].id == EITS_FAST_IDS && t[1].id == 1 && t[2].id == 2); /* never 0 */
+}
+
+/* A frame may be reported before or after drives of the next have found its touch: a board's drives
+ * do not wait for the solver. The ids are the same. */
+TEST(ids_do_not_depend_on_when_a_frame_is_reported)
+{
+    const eits_touch found = at(-40, 0, 0.5);
+    const eits_real near[2] = {-38, 3}, far[2] = {40, 0};
+    for (int late = 0; late < 2; ++late) {
+        uint32_t born = 0, other = 0;
+        set_up();
+        drives_follow(NULL, 0);
+        CHECK_EQUAL(report(&found, 1), 0); /* the first frame with it */
+        drives_follow(NULL, 0);
+        for (int turn = 0; turn < 2; ++turn) {
+            if (turn == late) {
+                CHECK_EQUAL(report(&found, 1), 1);
+                CHECK_EQUAL(t[0].id, 1);
+            } else {
+                other = eits_fast_id_at(fast, far);
+                born = eits_fast_id_at(fast, near);
+            }
+        }
+        CHECK(born == 1 && other == 2);
+        const eits_fast_touch followed[2] = {{.id = born, .x_mm = -38, .y_mm = 3},
+                                             {.id = other, .x_mm = 40}};
+        drives_follow(followed, 2);
+        CHECK_EQUAL(report(&found, 1), 2); /* it is one touch, with one id */
+        CHECK(t[0].id == 1 && t[0].x_mm == -40 && t[1].id == 2);
+    }
+}
+
+/* Drives follow a touch, lose it while frames still show it, and find it again. */
+TEST(a_touch_keeps_its_id_when_drives_lose_it)
+{
+    const eits_fast_touch followed = {.id = 1, .x_mm = 10, .confirmed = 1};
+    const eits_real here[2] = {11, 0};
+    const eits_touch found = at(12, 0, 0.5);
+    set_up();
+    fast->next_id = 2;
+    drives_follow(&followed, 1);
+    CHECK_EQUAL(report(&found, 1), 1);
+    drives_follow(NULL, 0);
+    CHECK_EQUAL(report(&found, 1), 0); /* it may have lifted in this scan */
+    drives_follow(NULL, 0);
+    CHECK_EQUAL(report(&found, 1), 1);
+    CHECK(t[0].id == 1 && t[0].confirmed == 1);
+    drives_follow(NULL, 0);
+    CHECK_EQUAL(eits_fast_id_at(fast, here), 1);
+    /* and through a gap: drives begin again, and frames between were not aligned */
+    drives_follow(&followed, 1);
+    CHECK_EQUAL(report(&found, 1), 1);
+    CHECK_EQUAL(report(&found, 1), 1);
+    CHECK(t[0].id == 1 && fast->n_seen == 1);
+    eits_fast_expect_again(fast);
+    CHECK_EQUAL(eits_fast_id_at(fast, here), 1);
+    /* one that lifted is not followed any more, and another that lands there is not it */
+    drives_follow(&followed, 1);
+    CHECK_EQUAL(report(&found, 1), 1);
+    drives_follow(NULL, 0);
+    CHECK_EQUAL(none(), 0);
+    drives_follow(NULL, 0);
+    CHECK_EQUAL(eits_fast_id_at(fast, here), 2);
+}
+
+/* Noise that one frame alone shows takes no id with it. */
+TEST(ids_that_nothing_takes_are_given_to_the_next)
+{
+    const eits_touch found = at(-40, 0, 0.5);
+    const eits_real far[2] = {40, 0};
+    set_up();
+    for (int round = 0; round < 3; ++round) {
+        drives_follow(NULL, 0);
+        CHECK_EQUAL(report(&found, 1), 0);
+        drives_follow(NULL, 0);
+        CHECK_EQUAL(none(), 0);
+    }
+    drives_follow(NULL, 0);
+    CHECK_EQUAL(eits_fast_id_at(fast, far), 1);
 }
 
 /* Clear ones at once, unconfirmed; others with the second frame. */

@@ -187,12 +187,14 @@ TEST(test_a_place_that_frames_find)
             {.id = 3, .x_mm = -2, .y_mm = 1, .strength_s_per_m_mm2 = 4, .explained = 0.5f}};
         /* the second frame with it reports it */
         CHECK_EQUAL(fw_tracker_note(&instrument->solve, true, found, 1, &info), round);
-        CHECK(round == 0 || found[0].id == EITS_FAST_FRAME_IDS + 1);
+        CHECK(round == 0 || found[0].id == 1);
         for (uint32_t unsolved = 0; unsolved < 3 - 2 * round; ++unsolved)
             align(frame);
         CHECK_OK(
             eits_fast_touches(instrument->solve.engine.fast, touches, EITS_FAST_TOUCHES, &count));
         CHECK_EQUAL(count, round);
+        CHECK(round == 0 ||
+              touches[0].id == 1); /* drives follow it by the id it was reported with */
     }
 }
 

@@ -50,9 +50,9 @@ typedef struct eits_fast_touch {
     eits_real x_variance_mm2, xy_covariance_mm2, y_variance_mm2; /* of its place */
 } eits_fast_touch;
 
-/* Once drives have come, touches that only whole frames show have ids greater than this, because
- * ids of touches from drives have 16 bits in a packet. */
-#define EITS_FAST_FRAME_IDS 65536u
+/* Touches have one sequence of ids, which begins again after this one: a packet of a drive's
+ * touches has 16 bits for an id. */
+#define EITS_FAST_IDS 65535u
 
 /* Bits that eits_fast_align sets for a frame. */
 typedef enum eits_fast_frame {
@@ -88,7 +88,7 @@ typedef struct eits_fast eits_fast;
     (EITS_FAST_BODY_NUMBERS * (EITS_FAST_BODY_NUMBERS + 3u) / 2u + 8u * EITS_FAST_BODIES + 26u)
 
 /* Bytes of the state without its arrays, at most: states, covariance and hypotheses; other numbers
- * of touches and drives; touches of whole frames, with 7 numbers and 4 counts each; counts and
+ * of touches and drives; touches of whole frames, with 9 numbers and 6 counts each; counts and
  * flags; pointers. csrc/src/fast/fast.h asserts that the state fits. */
 #define EITS_FAST_STATE                                                                            \
     EITS_ALIGN16(                                                                                  \
@@ -96,7 +96,7 @@ typedef struct eits_fast eits_fast;
          EITS_FAST_WAITING * (1u + EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS) +                 \
          16u * EITS_FAST_TOUCHES + EITS_FAST_BODIES * 164u + 96u) *                                \
             sizeof(eits_real) +                                                                    \
-        EITS_MAX_TOUCHES * (sizeof(eits_touch) + 7u * sizeof(eits_real) + 16u) +                   \
+        EITS_MAX_TOUCHES * (sizeof(eits_touch) + 9u * sizeof(eits_real) + 24u) +                   \
         EITS_FAST_TOUCHES * sizeof(eits_fast_touch) + EITS_MAX_ELECTRODES +                        \
         (80u + 10u * EITS_FAST_TOUCHES + 6u * EITS_FAST_WAITING + 6u * EITS_FAST_TRIALS) *         \
             sizeof(uint32_t) +                                                                     \
@@ -246,7 +246,7 @@ void eits_fast_forget_all(eits_fast *fast);
  *
  * After eits_fast_align these are the touches that drives followed at that time, each with what the
  * solver found about it. A touch that the solver found and drives do not follow is reported from
- * its second frame on; its id is greater than EITS_FAST_FRAME_IDS.
+ * its second frame on. It keeps its id when drives begin to follow it, or follow it no more.
  *
  * A frame that was not aligned has the touches that were found in it. A clear touch is reported at
  * once, and the second frame sets `confirmed`. A touch that explains less than 5 % of the frame, or

@@ -58,16 +58,19 @@ typedef struct fast_known {
     eits_real rho2;      /* square of where its soft disc ends, mm^2 */
 } fast_known;
 
-/* A touch that frames show and no drive follows (report.c). */
+/* A touch as frames report it: one that they alone show, or one that drives follow, which frames
+ * take over if drives lose it (report.c). */
 typedef struct fast_seen {
     eits_touch touch;          /* as it was last found */
     eits_real at[2], speed[2]; /* mm; mm in a frame */
     /* covariance of place and velocity, along either axis */
     eits_real place_mm2, both_mm2, speed_mm2;
-    uint32_t id;     /* 0: not reported yet */
-    uint32_t seen;   /* frames that showed it, counted up to EITS_FAST_SEEN_KNOWN */
-    uint32_t missed; /* consecutive frames that did not */
-    uint32_t faint;  /* 1: it was fainter than noise when it was last found */
+    uint32_t id;       /* 0: not reported yet */
+    uint32_t kept_id;  /* the id that is kept for it until it is reported; 0: none */
+    uint32_t followed; /* drives did: frames that must show it before they report it */
+    uint32_t seen;     /* frames that showed it, counted up to EITS_FAST_SEEN_KNOWN */
+    uint32_t missed;   /* consecutive frames that did not */
+    uint32_t faint;    /* 1: it was fainter than noise when it was last found */
 } fast_seen;
 
 /* A drive of the ring: rows, the triangle that whitens them, the known touches' answers with their
@@ -94,9 +97,9 @@ struct eits_fast {
     eits_real *gain; /* n_rows: model volts per measured volt */
     uint8_t *masked; /* n_rows: uses an electrode that a frame named */
     eits_real sign, rho2, sigma, noise_v;
-    eits_real drift;  /* of the gain */
-    uint32_t drifted; /* frames on end that it was far */
-    uint32_t time_us, timed, begun, next_id;
+    eits_real drift;                               /* of the gain */
+    uint32_t drifted;                              /* frames on end that it was far */
+    uint32_t time_us, timed, begun, next_id, born; /* born: since a frame was last aligned */
     uint32_t drive_count;
     uint32_t unexplained, newsy; /* a bit for each of the last 32 drives */
     uint32_t unexplained_frames, frame_explained;
@@ -104,17 +107,23 @@ struct eits_fast {
     eits_real frame_s;
     uint32_t glitched;                    /* in the last drive */
     uint32_t fresh;                       /* begun since a frame was last aligned */
-    uint32_t stirred, next_aligned;       /* touches changed in that frame; next_id as it was */
+    uint32_t stirred;                     /* touches changed in that frame */
     uint32_t named, named_before;         /* diagnostics of the last two solved frames */
     uint32_t wild;                        /* rows since the last frame */
+    uint32_t faulty;                      /* the last solved frame named an electrode */
     uint8_t suspect[EITS_MAX_ELECTRODES]; /* wild rows of each electrode, less those that are not */
     /* touches of frames; and those that drives followed when one was last aligned */
-    uint32_t n_seen, seen_ids;
-    uint32_t driven;  /* drives have come: ids of `seen` are then above EITS_FAST_FRAME_IDS */
+    uint32_t n_seen;
     uint32_t aligned; /* a frame that is not reported yet */
     uint32_t n_followed;
+    uint32_t kept_from, kept_until,
+        kept_used; /* ids kept at the last align; one of them is given */
     fast_seen seen[EITS_MAX_TOUCHES];
     eits_fast_touch followed[EITS_FAST_MAX_TOUCHES];
+    /* touches that drives may find: their ids, where they were, and which were found */
+    uint32_t n_expected, expected_id[EITS_MAX_TOUCHES];
+    eits_real expected_at[EITS_MAX_TOUCHES][2];
+    uint8_t expected_found[EITS_MAX_TOUCHES];
     /* tracks; strengths are above zero whatever the touches' sign */
     uint32_t count;
     fast_known known[EITS_FAST_MAX_TOUCHES];
@@ -232,11 +241,15 @@ static inline eits_real fast_between_s(uint32_t from_us, uint32_t to_us)
     return (eits_real)(int32_t)(to_us - from_us) * R(1e-6);
 }
 
-/* Return the least distance from touch k at which another may be born. It grows with k's width. */
+/* Return the least distance from a touch at which another may be born. It grows with its width. */
+static inline eits_real fast_room_of_mm(const eits_fast *fast, eits_real rho2)
+{
+    return EITS_FAST_APART_MM + EITS_FAST_APART_WIDE * (eits_sqrt(rho2) - eits_sqrt(fast->rho2));
+}
+
 static inline eits_real fast_room_mm(const eits_fast *fast, uint32_t k)
 {
-    return EITS_FAST_APART_MM +
-           EITS_FAST_APART_WIDE * (eits_sqrt(fast->known[k].rho2) - eits_sqrt(fast->rho2));
+    return fast_room_of_mm(fast, fast->known[k].rho2);
 }
 
 /* Whether a touch is as wide as a palm. The solver takes it for several discs, so that frames tell
@@ -246,15 +259,22 @@ static inline int fast_is_palm(eits_real rho2)
     return rho2 > fast_square(EITS_FAST_PALM_MM);
 }
 
-/* Whether a frame's touch, at a place of the model, is what the solver makes of a palm: it lies on
- * it, or is much fainter. */
+/* Whether a frame's touch, at `place` and with this strength, is what the solver makes of a palm at
+ * `palm` (x, y, strength): it lies on it, or is much fainter. */
+static inline int fast_is_rest_of(const eits_fast *fast, eits_real rho2, const eits_real *palm,
+                                  const eits_real *place, eits_real strength)
+{
+    return fast_is_palm(rho2) &&
+           (eits_fabs(strength) < EITS_FAST_PALM_REST * eits_fabs(palm[FAST_C]) ||
+            fast_distance2(place, palm) < fast_square(fast_room_of_mm(fast, rho2)));
+}
+
+/* Whether it is, with a palm that drives follow now and a place of the model. */
 static inline int fast_is_rest(const eits_fast *fast, const eits_real *place, eits_real strength)
 {
     for (uint32_t k = 0; k < fast->count; ++k) {
-        const eits_real *palm = fast->state + FAST_SIZE * k;
-        if (fast_is_palm(fast->known[k].rho2) &&
-            (eits_fabs(strength) < EITS_FAST_PALM_REST * palm[FAST_C] ||
-             fast_distance2(place, palm) < fast_square(fast_room_mm(fast, k))))
+        if (fast_is_rest_of(fast, fast->known[k].rho2, fast->state + FAST_SIZE * k, place,
+                            strength))
             return 1;
     }
     return 0;
@@ -278,6 +298,16 @@ void eits_fast_look(const eits_fast *fast, const eits_real *place, eits_real rho
  * the field at the other; times `factor` onto `out`. */
 void eits_fast_add_interplay(const eits_fast *fast, uint32_t drive, const fast_sight *a,
                              const fast_sight *b, eits_real factor, eits_real *out);
+
+/* ---- report.c ---- */
+
+/* A frame was aligned: ids are kept for touches that its report may name, and drives may find the
+ * touches that frames alone have shown. */
+void eits_fast_expect_touches(eits_fast *fast);
+/* Drives begin again: they may find the touches that they followed. */
+void eits_fast_expect_again(eits_fast *fast);
+/* The id of a touch that is born at `place`. */
+uint32_t eits_fast_id_at(eits_fast *fast, const eits_real *place);
 
 /* ---- bias.c ---- */
 

@@ -103,11 +103,12 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     fast->fresh = 0;
     fast->frame_s = fast_between_s(fast->aligned_us, fast->time_us);
     fast->aligned_us = fast->time_us;
-    fast->stirred = fast->glitched || fast->next_id != fast->next_aligned;
-    fast->next_aligned = fast->next_id;
+    fast->stirred = fast->glitched || fast->born;
+    fast->born = 0;
     /* A frame with drives that nothing explains would be named faulty, or solved into touches that
      * are not there. After EITS_FAST_FRAMES such frames the fault is real, or a touch too slow to
-     * be born; the solver decides. */
+     * be born; the solver decides. It does at once where it has named an electrode: without its
+     * contact the rows beside it change by more than noise, and the fault would come and go. */
     int explained = fast->held_count == 0;
     for (uint32_t n = 0; n < fast->drives; ++n)
         explained &= fast->drive[n].explained;
@@ -124,9 +125,10 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     fast->stirred |= !explained;
     fast->drifted = is_far(fast) ? fast->drifted + 1 : 0;
     *state = explained ? (uint32_t)EITS_FAST_EXPLAINED : 0u;
-    if (explained || fast->unexplained_frames > EITS_FAST_FRAMES)
+    if (explained || fast->unexplained_frames > EITS_FAST_FRAMES || fast->faulty)
         *state |= (uint32_t)EITS_FAST_TRUSTED;
     fast->aligned = 1;
+    eits_fast_expect_touches(fast);
     return eits_fast_touches(fast, fast->followed, EITS_FAST_MAX_TOUCHES, &fast->n_followed);
 }
 
@@ -161,9 +163,11 @@ static void match(const eits_fast *fast, const eits_real (*found)[2], uint32_t c
 static void mask_named(eits_fast *fast)
 {
     const uint8_t *states = fast->ctx->rows.electrode;
+    fast->faulty = 0;
     for (uint32_t i = 0; i < fast->model->n_rows && fast->drives > 0; ++i) {
         const uint8_t *row = eits_row(fast->ctx, i);
         fast->masked[i] = (states[row[0]] | states[row[1]] | states[row[2]] | states[row[3]]) != 0;
+        fast->faulty |= fast->masked[i];
     }
 }
 

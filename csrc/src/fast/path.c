@@ -389,7 +389,7 @@ eits_status eits_fast_drive(eits_fast *fast, uint32_t drive, const eits_real *vo
     if (fast->timed && gone_us > 0 && gone_us < UINT32_MAX / 2)
         eits_fast_predict(fast, (eits_real)gone_us * R(1e-6));
     fast->time_us = time_us;
-    fast->timed = fast->driven = 1;
+    fast->timed = 1;
     ++fast->drive_count;
     forget_off_skin(fast);
     uint32_t there = 0; /* the touches that the drive had when it was last measured */

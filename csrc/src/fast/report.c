@@ -1,9 +1,12 @@
 /* A frame's touches: those that drives follow, with what the whole-frame solver found of them, and
- * those that frames alone show, which are followed from frame to frame.
+ * those that frames alone show, which are followed from frame to frame. All have one sequence of
+ * ids. A board's drives go on while a frame is solved, and a host takes the same drives after that
+ * frame; so that both give the same ids, a frame that is reported gives only ids that were kept for
+ * it when it was aligned.
  *
- * Such a touch goes on by its velocity for one frame, and is what is found nearest to there. The
- * filter is Kalman's (Trans. ASME, J. Basic Eng. 82 (1960) 35-45) for a place of constant velocity,
- * with the same variances along both axes, so that no matrix is inverted:
+ * A touch that frames alone show goes on by its velocity for one frame, and is what is found
+ * nearest to there. The filter is Kalman's (Trans. ASME, J. Basic Eng. 82 (1960) 35-45) for a place
+ * of constant velocity, with the same variances along both axes, so that no matrix is inverted:
  *
  *     predict   p += v,  P += 2 C + V + q / 4,  C += V + q / 2,  V += q
  *     update    K = P / (P + R),  p += K (found - p),  v += C / (P + R) (found - p)
@@ -15,7 +18,6 @@
 #include "fast/fast.h"
 
 #include "context/places.h"
-
 #include "eitskin/force.h"
 
 enum { NONE = EITS_MAX_TOUCHES };
@@ -84,12 +86,14 @@ static fast_seen updated(const eits_fast *fast, const fast_seen *before, const e
         next = begun;
     next.touch = *found;
     next.id = before->id;
+    next.kept_id = before->kept_id;
     next.seen = before->seen;
+    next.followed = before->followed > 0 ? before->followed - 1 : 0;
     return next;
 }
 
-/* Nearest pairs first, among those that were reported or among the others: owner[n] is the touch
- * that `found` n is. */
+/* Nearest pairs first, among those that frames have reported or among the others: owner[n] is the
+ * touch that `found` n is. */
 static void pair(const eits_fast *fast, const eits_touch *found, uint32_t count, int reported,
                  uint32_t *owner)
 {
@@ -104,7 +108,8 @@ static void pair(const eits_fast *fast, const eits_touch *found, uint32_t count,
                 const fast_seen *s = &fast->seen[l];
                 const eits_real dx = found[n].x_mm - s->at[0], dy = found[n].y_mm - s->at[1];
                 const eits_real square = dx * dx + dy * dy;
-                if (!taken[l] && (s->id != 0) == reported && square <= nearest) {
+                if (!taken[l] && (s->id != 0 && s->followed == 0) == reported &&
+                    square <= nearest) {
                     nearest = square;
                     from = l;
                     to = n;
@@ -116,6 +121,13 @@ static void pair(const eits_fast *fast, const eits_touch *found, uint32_t count,
         owner[to] = from;
         taken[from] = 1;
     }
+}
+
+static uint32_t next_id(eits_fast *fast)
+{
+    const uint32_t id = fast->next_id;
+    fast->next_id = id % EITS_FAST_IDS + 1;
+    return id;
 }
 
 /* Count one more frame that shows the touch, and give it an id where it may be reported: at once if
@@ -133,8 +145,8 @@ static void name(eits_fast *fast, fast_seen *s, int drives)
     s->seen += s->seen < EITS_FAST_SEEN_KNOWN;
     if (s->id != 0 || (s->seen < 2 && !sure))
         return;
-    while (s->id == 0) /* after 2^32 touches ids come round */
-        s->id = ++fast->seen_ids + (fast->driven ? EITS_FAST_FRAME_IDS : 0u);
+    fast->kept_used |= s->kept_id;
+    s->id = s->kept_id != 0 ? s->kept_id : next_id(fast);
 }
 
 /* Follow the `count` found touches that no drives follow. Those that were found come first, in
@@ -172,10 +184,8 @@ void eits_fast_forget_all(eits_fast *fast)
 {
     if (fast == NULL)
         return;
-    fast->n_seen = fast->begun = fast->aligned = 0;
+    fast->n_seen = fast->n_followed = fast->begun = fast->aligned = 0;
 }
-
-/* ---- the report ---- */
 
 /* The nearest to `place`, mm, of those found that no touch has taken, within EITS_FAST_APART_MM;
  * `count` where there is none. */
@@ -193,6 +203,63 @@ static uint32_t nearest(const eits_real *place, const eits_real (*found)[2], con
     }
     return best;
 }
+
+/* ---- touches that drives may find ---- */
+
+static void expect(eits_fast *fast, uint32_t id, eits_real x_mm, eits_real y_mm)
+{
+    const uint32_t n = fast->n_expected++;
+    fast->expected_id[n] = id;
+    fast->expected_at[n][0] = x_mm;
+    fast->expected_at[n][1] = y_mm;
+    fast->expected_found[n] = 0;
+}
+
+static int is_known(const eits_fast *fast, uint32_t id)
+{
+    int known = 0;
+    for (uint32_t k = 0; k < fast->count; ++k)
+        known |= fast->known[k].id == id;
+    return known;
+}
+
+void eits_fast_expect_touches(eits_fast *fast)
+{
+    if (!fast->kept_used && fast->next_id == fast->kept_until)
+        fast->next_id = fast->kept_from; /* none of the last ids was given */
+    fast->kept_from = fast->next_id;
+    fast->kept_used = fast->n_expected = 0;
+    for (uint32_t k = 0; k < fast->n_seen; ++k) {
+        fast_seen *s = &fast->seen[k];
+        if (s->followed > 0 || s->missed > 0 || is_known(fast, s->id))
+            continue;
+        s->kept_id = s->id != 0 ? s->id : next_id(fast);
+        expect(fast, s->kept_id, s->touch.x_mm, s->touch.y_mm);
+    }
+    fast->kept_until = fast->next_id;
+}
+
+void eits_fast_expect_again(eits_fast *fast)
+{
+    fast->n_expected = 0;
+    for (uint32_t k = 0; k < fast->n_followed; ++k)
+        expect(fast, fast->followed[k].id, fast->followed[k].x_mm, fast->followed[k].y_mm);
+}
+
+uint32_t eits_fast_id_at(eits_fast *fast, const eits_real *place)
+{
+    eits_real at[2] = {place[0], place[1]};
+    eits_place_on_skin(fast->ctx, at);
+    const uint32_t n = nearest(at, (const eits_real(*)[2])fast->expected_at, fast->expected_found,
+                               fast->n_expected);
+    if (n == fast->n_expected)
+        return next_id(fast);
+    fast->expected_found[n] = 1;
+    fast->kept_used = 1;
+    return fast->expected_id[n];
+}
+
+/* ---- the report ---- */
 
 /* A touch that the solver has not found in this frame: what drives know of it. */
 static eits_touch alone(const eits_fast *fast, const eits_fast_touch *t)
@@ -237,6 +304,33 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
     return fast->n_followed;
 }
 
+/* Touches that drives follow, `touches` of this frame, are followed from frame to frame as well, in
+ * case drives lose them. Two frames must then show one before it is reported: what a lift leaves
+ * of a frame is not there in the next. */
+static void keep_followed(eits_fast *fast, const eits_touch *touches)
+{
+    for (uint32_t k = 0; k < fast->n_followed && fast->n_seen < EITS_MAX_TOUCHES; ++k) {
+        fast_seen *s = &fast->seen[fast->n_seen++];
+        *s = start(fast, &touches[k]);
+        s->id = touches[k].id;
+        s->seen = EITS_FAST_SEEN_KNOWN;
+        s->followed = 2;
+    }
+}
+
+static void forget_followed(eits_fast *fast)
+{
+    uint32_t kept = 0;
+    for (uint32_t l = 0; l < fast->n_seen; ++l) {
+        int followed = 0;
+        for (uint32_t k = 0; k < fast->n_followed; ++k)
+            followed |= fast->followed[k].id == fast->seen[l].id;
+        if (!followed)
+            fast->seen[kept++] = fast->seen[l];
+    }
+    fast->n_seen = kept;
+}
+
 /* Add those that frames alone show. One that this frame lacks is reported if it was well known and
  * fainter than noise when it was last found: a clear touch has lifted. */
 static void report_seen(const eits_fast *fast, int drives, eits_touch *touches, uint32_t *count)
@@ -245,7 +339,7 @@ static void report_seen(const eits_fast *fast, int drives, eits_touch *touches, 
         const fast_seen *s = &fast->seen[k];
         const int held = !drives && s->faint && s->seen == EITS_FAST_SEEN_KNOWN &&
                          *count < fast->ctx->options.max_touches;
-        if (s->id == 0 || (s->missed > 0 && !held))
+        if (s->id == 0 || (drives && s->followed > 0) || (s->missed > 0 && !held))
             continue;
         eits_touch *t = &touches[(*count)++];
         *t = s->touch;
@@ -270,6 +364,21 @@ static void sort(eits_touch *touches, uint32_t count)
     }
 }
 
+/* Whether the solver found it because of a palm that drives followed when the frame was aligned:
+ * what they follow now depends on when the frame is reported. */
+static int is_rest(const eits_fast *fast, const eits_touch *found)
+{
+    const eits_real place[2] = {found->x_mm, found->y_mm};
+    for (uint32_t k = 0; k < fast->n_followed; ++k) {
+        const eits_fast_touch *t = &fast->followed[k];
+        const eits_real palm[FAST_WAYS] = {t->x_mm, t->y_mm, t->strength_s_per_m_mm2};
+        const eits_real rho2 = fast_square(EITS_FAST_SOFT_RADIUS * t->radius_mm);
+        if (fast_is_rest_of(fast, rho2, palm, place, found->strength_s_per_m_mm2))
+            return 1;
+    }
+    return 0;
+}
+
 eits_status eits_fast_report(eits_fast *fast, const eits_touch *found, uint32_t n_found,
                              eits_touch *touches, uint32_t *count)
 {
@@ -280,19 +389,21 @@ eits_status eits_fast_report(eits_fast *fast, const eits_touch *found, uint32_t 
         (found == NULL && n_found > 0))
         return EITS_E_ARGUMENT;
     const int drives = fast->aligned != 0;
-    fast->aligned = 0;
-    fast->n_followed = drives ? fast->n_followed : 0;
-    *count = report_followed(fast, found, n_found, taken, touches);
+    fast->aligned = *count = 0;
+    if (drives) {
+        forget_followed(fast);
+        *count = report_followed(fast, found, n_found, taken, touches);
+    }
     if (found != NULL) {
         for (uint32_t n = 0; n < n_found; ++n) {
-            eits_real at[2] = {found[n].x_mm, found[n].y_mm};
-            eits_place_in_model(fast->ctx, at);
-            if (!taken[n] && !fast_is_rest(fast, at, found[n].strength_s_per_m_mm2))
+            if (!taken[n] && !(drives && is_rest(fast, &found[n])))
                 rest[n_rest++] = found[n];
         }
         follow(fast, rest, n_rest, drives);
         report_seen(fast, drives, touches, count);
     }
+    if (drives)
+        keep_followed(fast, touches);
     sort(touches, *count);
     return EITS_OK;
 }

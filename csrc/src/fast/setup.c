@@ -142,8 +142,6 @@ eits_status eits_fast_begin(eits_fast *fast)
         return EITS_E_ARGUMENT;
     const eits_reference *reference = &fast->ctx->reference;
     fast->begun = 0;
-    if (!fast->driven && fast->next_id <= fast->seen_ids)
-        fast->next_id = fast->seen_ids + 1;
     /* Without noise every residual would be news, and chi-squares infinite. */
     if (!reference->ready || !(reference->noise_v > 0))
         return EITS_E_NO_REFERENCE;
@@ -159,10 +157,11 @@ eits_status eits_fast_begin(eits_fast *fast)
     fast->noise_v = reference->noise_v;
     fast->sigma = rows > 0 ? reference->noise_v * eits_sqrt(energy / (eits_real)rows) : 0;
     fast->sign = fast->ctx->options.sign == EITS_SIGN_DECREASE ? R(-1) : R(1);
+    eits_fast_expect_again(fast);
     fast->drift = 0;
-    fast->wild = 0;
+    fast->wild = fast->faulty = 0;
     memset(fast->suspect, 0, sizeof fast->suspect);
-    fast->count = fast->quiet = fast->seeds = fast->newsy = fast->drive_count = 0;
+    fast->count = fast->quiet = fast->seeds = fast->newsy = fast->drive_count = fast->born = 0;
     fast->timed = fast->unexplained = fast->unexplained_frames = fast->glitched = 0;
     eits_fast_empty_ring(fast);
     fast->search.warm_count = fast->search.pair_known = fast->search.last_count = 0;
@@ -174,7 +173,6 @@ eits_status eits_fast_begin(eits_fast *fast)
         fast->ring[n]->plain = 0;
     /* What frames named stays until the next is aligned: one may still be solved meanwhile. */
     fast->fresh = 1;
-    fast->next_aligned = fast->next_id;
     for (uint32_t n = 0; n < fast->drives; ++n) {
         /* Nothing is wrong with drives that were not measured yet; the first frame is not held back
          * for them. */

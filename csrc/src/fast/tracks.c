@@ -211,10 +211,13 @@ void eits_fast_add(eits_fast *fast, const eits_real *state, eits_real (*covarian
     const uint32_t k = fast->count++;
     eits_copy(fast->state + (size_t)FAST_SIZE * k, state, FAST_SIZE);
     eits_fast_set_covariance(fast, k, covariance);
-    fast->known[k] = (fast_known){
-        .id = fast->next_id, .on = 1, .peak = state[FAST_C], .energy = energy, .rho2 = rho2};
+    fast->known[k] = (fast_known){.id = eits_fast_id_at(fast, state),
+                                  .on = 1,
+                                  .peak = state[FAST_C],
+                                  .energy = energy,
+                                  .rho2 = rho2};
     fast->known[k].moving = covariance[FAST_VX][FAST_VX] > 0;
-    fast->next_id = fast->next_id == UINT32_MAX ? 1 : fast->next_id + 1;
+    fast->born = 1;
 }
 
 void eits_fast_still(eits_fast *fast, uint32_t k)

@@ -14,7 +14,7 @@
 typedef struct fw_stream {
     uint16_t what, every; /* EITS_STREAM_* */
     uint32_t left;        /* streamed frames until it stops, if `counted` */
-    bool counted;
+    bool counted, began;
     uint32_t phase; /* frames until the next one that is streamed */
 } fw_stream;
 

@@ -169,6 +169,10 @@ static void stream(fw_host_link *link, fw_frame *frame, const fw_quality *qualit
     const bool solved = fw_solve_tared(link->solve) && (what & ~(uint32_t)EITS_STREAM_RAW) != 0;
     const uint32_t began_us = fw_now_us(link->board);
     const float *aligned = fw_tracks_align(link, frame);
+    if (fw_tracks_misses(link, frame)) {
+        fw_frame_examine(link->solve, frame, quality);
+        return;
+    }
     const bool unsolved = (frame->flags & EITS_RAW_ALIGNED) != 0 && aligned == NULL;
     const float *volts = aligned != NULL ? aligned : frame->volts;
     uint32_t solving_us = 0;

@@ -6,10 +6,14 @@
 #include "app/safety/current_enable.h"
 #include "app/solve/tracker.h"
 
+static bool asked_for(const fw_host_link *link)
+{
+    return (link->stream.what & FW_TRACKED) != 0 && link->stream.every == 1;
+}
+
 static bool wanted(const fw_host_link *link)
 {
-    return (link->stream.what & FW_TRACKED) != 0 && link->stream.every == 1 &&
-           fw_tracker_ready(link->solve) && !fw_current_settling(link->safety);
+    return asked_for(link) && fw_tracker_ready(link->solve) && !fw_current_settling(link->safety);
 }
 
 static uint16_t short_us(uint32_t us)
@@ -108,8 +112,7 @@ void fw_tracks_release(fw_host_link *link)
 
 void fw_tracks_restart(fw_host_link *link)
 {
-    const bool on = (link->stream.what & FW_TRACKED) != 0 && link->stream.every == 1 &&
-                    fw_tracker_possible(link->solve);
+    const bool on = asked_for(link) && fw_tracker_possible(link->solve);
     fw_tracker_forget(link->solve);
     fw_acquire_report_drives(link->acquire, on ? go_on : NULL, link);
 }
@@ -126,4 +129,12 @@ const float *fw_tracks_align(fw_host_link *link, fw_frame *frame)
     if (fw_tracker_align(link->solve, frame, &volts))
         go_on(link);
     return volts;
+}
+
+bool fw_tracks_misses(fw_host_link *link, const fw_frame *frame)
+{
+    const bool first = !link->stream.began;
+    link->stream.began = true;
+    return first && (frame->flags & EITS_RAW_ALIGNED) == 0 && wanted(link) &&
+           fw_tracker_possible(link->solve);
 }

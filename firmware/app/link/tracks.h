@@ -30,4 +30,9 @@ void fw_tracks_at_frame(fw_host_link *link, bool taken);
  * solved. */
 const float *fw_tracks_align(fw_host_link *link, fw_frame *frame);
 
+/* Whether the frame is the stream's first and its scan began before the stream, although touches
+ * are tracked. Drives of the next scan may have found its touches before it is solved, and it would
+ * give them other ids. */
+bool fw_tracks_misses(fw_host_link *link, const fw_frame *frame);
+
 #endif
