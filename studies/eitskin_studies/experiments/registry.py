@@ -43,6 +43,9 @@ EXPERIMENTS = {
         "a model taught from presses at known places on a measured skin, with every baseline on the"
         " same splits"
     ),
+    "taught-sessions": (
+        "measured presses streamed one after another to a taught model: ids, false touches, delay"
+    ),
     "deformation": (
         "a skin stretched and bent, by the flat one's model, before and after a fresh tare"
     ),

@@ -18,7 +18,8 @@ from eitskin_studies.experiments.registry import EXPERIMENTS
 from eitskin_studies.harness.sections import fill_readme
 
 RESULTS = "studies/results"
-DATA = {"tank": "TANKS", "teaching": "PRESSES"}  # studies on measured frames, and who names them
+# studies on measured frames, and who names them
+DATA = {"tank": "TANKS", "teaching": "PRESSES", "taught-sessions": "PRESSES"}
 SHARES = {"other-worlds": "0.5", "patterns": "0.3"}  # of the usual scenes, as the pages have them
 OTHERS = {
     "tradeoff": "tradeoff run -o out/tradeoff --page {page}"

@@ -9,6 +9,7 @@ import pytest
 from all_engines import AllEngines
 from eitskin.core.results import Reconstruction
 from eitskin.model.model import Model
+from eitskin.model.options import default_options, tracking
 from eitskin.scene.library_scenes import find_scene
 from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.runner import run_scene
@@ -68,6 +69,26 @@ def test_drift_between_presses_does_no_harm(model):
         core.set_options(reference_frames=frames)
         late[frames] = np.median(errors_mm(core)[-30:])
     assert late[2] < 5 < 10 < late[0]
+
+
+def test_a_taught_model_tracks_presses_that_come_and_go(model):
+    """Each press has one id from its first report until it lifts, another one than those before,
+    and is confirmed; nothing is reported of the untouched skin."""
+    some = presses(4, seed=11)
+    core = Reconstructor(model, options=tracking(default_options(model)))
+    core.tare(some.untouched[:1] + noise(TARE, 9))
+    ids = []
+    for k, place in enumerate(some.place_mm):
+        shares = [0, 0, 0, 0.5, *[1] * 10, 0.5, 0, 0, 0]
+        volts = some.untouched[k] + np.array(shares)[:, None] * some.difference[k]
+        found = [core.follow(one).touches for one in volts + noise(len(shares), 20 + k)]
+        held = [one for touches in found[4:14] for one in touches]
+        ids.append({one.id for one in held})
+        assert len(held) == 10 and len(ids[-1]) == 1
+        assert all(one.confirmed for one in held[1:])
+        assert np.hypot(held[-1].x_mm - place[0], held[-1].y_mm - place[1]) < 5
+        assert not any(found[:3]) and not any(found[-2:])
+    assert len(set.union(*ids)) == 4
 
 
 def test_both_widths_follow_alike(model):
