@@ -41,7 +41,7 @@ float fw_rounding_v(uint32_t volts_per_code_nv, uint32_t excitation_millihz, uin
 {
     const uint64_t periods = (uint64_t)excitation_millihz * samples / ((uint64_t)rate_hz * 1000u);
     const float step_nv = (float)volts_per_code_nv,
-                phases = (float)(samples / greatest_divisor(samples, periods));
+                phases = (float)(uint32_t)(samples / greatest_divisor(samples, periods));
     /* the variance of a code is step^2 / 12; that of an amplitude is 2 / phases times as large */
     return sqrtf(step_nv * step_nv / (6.0f * phases)) * 1e-9f;
 }
@@ -60,7 +60,7 @@ fw_status fw_demodulate_setup(fw_demodulator *d, const fw_capture *capture, uint
         return FW_E_ARGUMENT;
     const uint32_t periods =
         (uint32_t)((uint64_t)excitation_millihz * samples / ((uint64_t)rate_hz * 1000u));
-    const uint64_t steps = (uint64_t)capture->full_scale_code + 1u;
+    const uint32_t steps = capture->full_scale_code + 1u;
     int64_t sum[2] = {0, 0};
     for (uint32_t k = 0; k < samples; ++k) {
         float c, s;
