@@ -71,7 +71,7 @@
 #define EITS_FAST_ANSWERS 30
 
 /* fewer for each known touch, which take their own work [answers]. as FAST_ANSWERS */
-#define EITS_FAST_TOUCH_ANSWERS 3
+#define EITS_FAST_TOUCH_ANSWERS 6
 
 /* what the map of a drive costs [answers]. larger: fewer pieces of a search in a drive */
 #define EITS_FAST_MAP_ANSWERS 4

@@ -221,15 +221,10 @@ static void end_swerve(eits_fast *fast)
 static uint32_t cost_of_wider(const eits_fast *fast)
 {
     uint32_t k;
-    return fast->search.count > 2 && search_one(fast)->exists && eits_search_near(fast, &k) &&
-                   fast->known[k].age < EITS_FAST_WIDENS
+    return fast->search.count > 4 && search_one(fast)->exists && !eits_search_clear(fast) &&
+                   eits_search_near(fast, &k) && fast->known[k].age < EITS_FAST_WIDENS
                ? fast->search.count
                : 0;
-}
-
-static uint32_t cost_of_wide(const eits_fast *fast)
-{
-    return eits_search_clear(fast) ? 0 : cost_of_wider(fast);
 }
 
 static void try_wider(eits_fast *fast, eits_real rho)
@@ -245,8 +240,6 @@ static void try_wide(eits_fast *fast)
     try_wider(fast, EITS_FAST_RHO_WIDE_MM);
 }
 
-/* A palm that lands grows at one side first, which a finger that moves explains as well: this width
- * is looked for even if a move is clear. */
 static void try_widest(eits_fast *fast)
 {
     try_wider(fast, EITS_FAST_RHO_WIDER_MM);
@@ -256,6 +249,6 @@ const search_piece eits_piece_move = {cost_of_move, look_at_moves, end_moves};
 const search_piece eits_pieces_change[4] = {
     {cost_of_replace, look_for_place, end_instead},
     {cost_of_swerve, look_for_swerve, end_swerve},
-    {cost_of_wide, try_wide, end_instead},
+    {cost_of_wider, try_wide, end_instead},
     {cost_of_wider, try_widest, end_instead},
 };

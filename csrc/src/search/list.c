@@ -48,14 +48,15 @@ static const search_piece *piece(uint32_t task)
     return task < simple + changes + births ? &eits_pieces_birth[task - simple - changes] : NULL;
 }
 
-_Static_assert(EITS_FAST_ANSWERS >= EITS_FAST_TOUCH_ANSWERS * EITS_FAST_MAX_TOUCHES +
-                                        FAST_BODIES * EITS_FAST_SEARCHED,
-               "each look fits into a drive");
+/* A look at two touches in all drives of a search costs the most. */
+enum { FAST_LOOK = FAST_BODIES * EITS_FAST_SEARCHED };
+_Static_assert(FAST_LOOK >= 4 + EITS_FAST_MAX_TOUCHES, "no look at moves costs more");
 
-/* Whether there is work left in this drive for as much. */
+/* Whether there is work left in this drive for as much. The first piece of a drive always fits: it
+ * costs at most FAST_LOOK. */
 static int has_room(const eits_fast *fast, uint32_t cost)
 {
-    return fast->search.spent + cost <= fast->search.most;
+    return fast->search.spent == 0 || fast->search.spent + cost <= fast->search.most;
 }
 
 /* All of the drives that wait, as far as they are searched, are whitened; 0 where that needs
@@ -130,7 +131,8 @@ int eits_search(eits_fast *fast)
 {
     fast_search *s = &fast->search;
     s->spent = 0;
-    s->most = EITS_FAST_ANSWERS - EITS_FAST_TOUCH_ANSWERS * fast->count;
+    const uint32_t own = EITS_FAST_TOUCH_ANSWERS * fast->count;
+    s->most = own < EITS_FAST_ANSWERS ? EITS_FAST_ANSWERS - own : 0;
     if (!s->active && !begin(fast))
         return 0;
     /* with one touch nothing else has asked for it */

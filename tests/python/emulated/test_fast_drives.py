@@ -11,9 +11,16 @@ from eitskin_emulator.core_on_qemu import PROGRAM, EmulatedRun, run_steps
 from eitskin_emulator.core_steps import Choose, Drives, Load, TareStep
 from scans_in_time import ROW_S, STEP, order
 
-# one finger, then none, then two at once, light ones that are long in doubt
-SCENES = {"quiet": (0, 0), "one": (0, 1, 1, 1, 0, 0), "two": (0, 2, 2, 2), "light": (0, 2, 2, 2)}
-MOST = {"quiet": 6_000, "one": 280_000, "two": 280_000, "light": 280_000}
+# one finger, then none, then two at once, light ones that are long in doubt, up to six
+SCENES = {
+    "quiet": (0, 0),
+    "one": (0, 1, 1, 1, 0, 0),
+    "two": (0, 2, 2, 2),
+    "light": (0, 2, 2, 2),
+    "hand": (0, 2, 4, 5, 6, 6, 3),
+}
+MOST = dict.fromkeys(SCENES, 280_000) | {"quiet": 6_000}
+PLACES = ((30.0, -40.0), (-35.0, 20.0), (45.0, 30.0), (-45.0, -45.0), (0.0, 70.0), (0.0, -5.0))
 ONE_TOUCH = 40_000
 
 
@@ -26,7 +33,7 @@ def scans_of(name: str, v0: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     electrodes = model.protocol.n_electrodes
     x, y = fields.columns[:, :electrodes], fields.columns[:, electrodes : 2 * electrodes]
     touches, size = [], 0.05 if name == "light" else 1.0
-    for place in ((30.0, -40.0), (-35.0, 20.0)):
+    for place in PLACES:
         near = np.hypot(*(model.grid.centres_mm() - place).T) < 9
         drive, measure = (
             (x[near][:, table[:, k]] - x[near][:, table[:, k + 1]],
