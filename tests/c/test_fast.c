@@ -546,6 +546,116 @@ TEST(test_named_electrodes)
     CHECK_EQUAL(b->fast->masked[0] | b->fast->masked[39], 0);
 }
 
+/* A frame is not solved while a drive of it waits for an explanation; but it is, as it was
+ * measured, while an electrode is named. */
+TEST(test_frames_of_a_named_electrode_are_solved)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    uint8_t *states = b->skin.ctx->rows.electrode;
+    eits_real aligned[SMALL_ROWS];
+    for (uint32_t named = 0; named < 2; ++named) {
+        CHECK_OK(eits_fast_begin(b->fast));
+        states[3] = (uint8_t)named;
+        confirm(b, NULL, 0);
+        b->fingers = 0;
+        drives(b, 8);
+        put(b, 0, 20, 11, 1);
+        drives(b, 2); /* one of them may have no rows without the electrode */
+        CHECK_EQUAL(align(b, aligned), named ? EITS_FAST_TRUSTED : 0);
+        CHECK(memcmp(aligned, b->frame, sizeof aligned) == 0);
+    }
+    CHECK_OK(eits_fast_begin(b->fast)); /* what a frame named before is forgotten */
+    drives(b, 1);
+    CHECK_EQUAL(align(b, aligned) & EITS_FAST_TRUSTED, 0);
+    states[3] = 0;
+}
+
+/* Its place grows less sure by the same variance in each drive that does not show it, and sure
+ * again as soon as one does. */
+TEST(test_a_touch_that_no_row_shows)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    const eits_real each =
+        EITS_FAST_STILL_MM * EITS_FAST_STILL_MM * (eits_real)DRIVE_US * R(1e-6) / EITS_FAST_DRIVE_S;
+    drives(b, 8);
+    put(b, 0, 20, 11, 1);
+    drives(b, 40);
+    check_reported(b, 0.3);
+    CHECK_EQUAL(b->fast->known[0].moving, 0);
+    const eits_real seen = b->fast->p[FAST_X][FAST_X];
+    eits_real before = seen;
+    for (uint32_t k = 0; k < 6; ++k) {
+        for (uint32_t i = 0; i < SMALL_ROWS; ++i)
+            b->frame[i] = (eits_real)NAN;
+        give(b);
+        CHECK_NEAR(b->fast->p[FAST_X][FAST_X] - before, each, 1e-3 * (double)each);
+        before = b->fast->p[FAST_X][FAST_X];
+    }
+    drives(b, 8);
+    CHECK(b->fast->p[FAST_X][FAST_X] < (before + seen) / 2);
+    check_reported(b, 0.3);
+}
+
+/* The first finger may be reported by the first drive that shows it clearly; one beside a known
+ * finger, which might have moved, must come out of two searches. Lifted, each goes alone. */
+TEST(test_fingers_land_one_after_another_and_lift)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    eits_fast_touch touch[EITS_FAST_TOUCHES];
+    uint32_t waited[2] = {0, 0};
+    drives(b, 8);
+    for (uint32_t n = 0; n < 2; ++n) {
+        put(b, n, n == 0 ? 22 : -40, n == 0 ? 38 : -24, 2);
+        while (reported(b, touch) <= n && waited[n] < 12) {
+            drives(b, 1);
+            ++waited[n];
+        }
+        CHECK_EQUAL(reported(b, touch), n + 1);
+        CHECK(touch[n].id == n + 1 && touch[n].confirmed == 0);
+        drives(b, 24);
+    }
+    CHECK(waited[0] >= 1 && waited[1] > 1 && waited[0] <= waited[1] && waited[1] <= 6);
+    check_reported(b, 0.3);
+    b->on[0] = b->on[1];
+    b->fingers = 1;
+    drives(b, 4);
+    check_reported(b, 0.3); /* what stays is where it was */
+    CHECK_EQUAL(reported(b, touch), 1);
+    CHECK_EQUAL(touch[0].id, 2);
+    drives(b, EITS_FAST_GONE + 12);
+    put(b, 1, 30, 30, 2);
+    drives(b, 12);
+    CHECK_EQUAL(reported(b, touch), 2);
+    CHECK_EQUAL(touch[1].id, 3);
+}
+
+/* A touch that frames find and no drive has its id from the first report of a frame on, and drives
+ * follow it by this id. */
+TEST(test_drives_follow_a_touch_by_the_id_of_its_frames)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    eits_touch found = {.x_mm = -40, .strength_s_per_m_mm2 = (eits_real)unit(b), .explained = 1};
+    eits_touch all[EITS_MAX_TOUCHES];
+    eits_fast_touch touch[EITS_FAST_TOUCHES];
+    eits_real aligned[SMALL_ROWS];
+    uint32_t count = 0;
+    for (uint32_t frame = 0; frame < 2; ++frame) {
+        drives(b, 8);
+        (void)align(b, aligned);
+        CHECK_OK(eits_fast_report(b->fast, &found, 1, all, &count));
+        CHECK_EQUAL(count, frame);
+        CHECK_OK(eits_fast_confirm(b->fast, &found, 1));
+    }
+    CHECK_EQUAL(all[0].id, 1);
+    CHECK_EQUAL(reported(b, touch), 1);
+    CHECK_EQUAL(touch[0].id, 1);
+    put(b, 0, -40, 0, 1);
+    put(b, 1, 40, 0, 1);
+    drives(b, 16);
+    CHECK_EQUAL(reported(b, touch), 2);
+    CHECK(touch[0].id == 1 && touch[1].id == 2);
+}
+
 /* Bits that may be reported of those found; all electrodes go with their bit. */
 static uint32_t named(bench *b, uint32_t found)
 {
