@@ -231,6 +231,7 @@ typedef struct eits_joint_memory {
     eits_real energy; /* |W d|^2 less its part along the drift: what no touches leave */
     eits_real *normal, *factor, *kept; /* EITS_JOINT_TRIANGLE each, packed by rows */
     uint64_t spent;                    /* multiply-accumulates of this frame's joint fits */
+    uint64_t evaluated;                /* and of the last evaluation with slopes */
     eits_real gradient[EITS_JOINT_PARAMETERS];
 } eits_joint_memory;
 

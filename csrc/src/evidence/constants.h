@@ -51,7 +51,7 @@
 /* of test_columns, that a sheet may be tested with that does not look drifted, less the moves that
  * the fit has made [columns]. larger: costs; smaller: shapes become touches, and more frames are
  * crowded */
-#define EITS_STILL_COLUMNS 160
+#define EITS_STILL_COLUMNS 120
 
 /* but at least [columns]. as STILL_COLUMNS */
 #define EITS_STILL_MIN 80

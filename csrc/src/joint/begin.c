@@ -143,6 +143,7 @@ void eits_fit_jointly(eits_context *ctx, const eits_scratch *scratch, eits_fit *
     if (!same_touches(ctx, f, j)) {
         *j = begin(ctx, f);
         eits_joint_guess_kinds(ctx, j);
+        ctx->joint.spent = f->macs; /* the fit of discs and the test as well */
         f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, scratch, j);
     }
     if (was_better(ctx, &first, j)) {

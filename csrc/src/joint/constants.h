@@ -258,15 +258,21 @@
 #define EITS_JOINT_CLOSE R(0.05)
 
 /* a search begins no step after it has taken so many [multiply-accumulates]. as JOINT_WORK */
-#define EITS_JOINT_SEARCH_WORK 700000
+#define EITS_JOINT_SEARCH_WORK 1000000
 
 /* trying one as two begins no step after it has taken so many [multiply-accumulates]. as
  * JOINT_WORK */
 #define EITS_JOINT_SPLIT_WORK 500000
 
-/* all joint fits of a frame together begin no step after they have taken so many
- * [multiply-accumulates]. as JOINT_WORK */
-#define EITS_JOINT_FRAME_WORK 2200000
+/* no joint fit begins a step that would take the touches of a frame, their fit of discs and their
+ * test included, above so many [multiply-accumulates]. larger: costs; smaller: crowds are not
+ * settled */
+#define EITS_JOINT_FRAME_WORK 3400000
+
+/* of these, so many are kept for the fit of discs, the test and the fit after it
+ * [multiply-accumulates]. larger: missing touches of crowds stay missing; smaller: touches of the
+ * test are not refined */
+#define EITS_JOINT_AGAIN 1200000
 
 /* rounds by which the induced field is made about shapes that are settled. larger: costs; smaller:
  * touches at the rim are not at their minimum */

@@ -62,12 +62,11 @@ static eits_real *along_of(eits_context *ctx, uint32_t a)
     return ctx->joint.along + (size_t)EITS_JOINT_NUISANCES * a;
 }
 
-static eits_real product(const eits_real *a, const eits_real *b, uint32_t count)
+/* A product of two columns' sums with what no touch causes: mostly the gain's drift alone. */
+static eits_real product(const eits_context *ctx, const eits_real *a, const eits_real *b)
 {
-    eits_real sum = 0;
-    for (uint32_t i = 0; i < count; ++i)
-        sum = eits_fma(a[i], b[i], sum);
-    return sum;
+    return ctx->joint.errors == 0 ? a[0] * b[0]
+                                  : eits_dot(ctx->kernels, a, b, 1u + ctx->joint.errors);
 }
 
 /* The weighed columns of one block, into the normal equations. */
@@ -169,7 +168,6 @@ uint64_t eits_joint_restore(eits_context *ctx, const eits_joint *j, uint32_t k)
 static void finish_normal(eits_context *ctx, const eits_joint *j, uint32_t further, const sums *s)
 {
     eits_joint_memory *m = &ctx->joint;
-    const uint32_t nuisances = 1u + m->errors;
     const uint32_t n = j->free_count * j->parameters;
     for (uint32_t a = 0; a < n + further; ++a) {
         const uint32_t p = a < n ? a % j->parameters : 0; /* further discs have no prior */
@@ -177,10 +175,10 @@ static void finish_normal(eits_context *ctx, const eits_joint *j, uint32_t furth
         const eits_real prior = eits_joint_precision(shape, p);
         eits_real *row = eits_lower_row(m->normal, a), *along = along_of(ctx, a);
         eits_joint_finish_along(ctx, along);
-        m->gradient[a] -= product(along, s->along, nuisances);
+        m->gradient[a] -= product(ctx, along, s->along);
         m->gradient[a] = eits_fma(-prior, eits_joint_offset(ctx, shape, p), m->gradient[a]);
         for (uint32_t b = 0; b <= a; ++b)
-            row[b] -= product(along, along_of(ctx, b), nuisances);
+            row[b] -= product(ctx, along, along_of(ctx, b));
         row[a] += prior;
     }
 }
@@ -225,10 +223,12 @@ static uint64_t evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds, int 
     }
     j->left = eits_fma(-s.along[0], s.along[0], s.square);
     eits_joint_finish_along(ctx, s.along);
-    j->misfit = s.square - product(s.along, s.along, 1u + m->errors);
+    j->misfit = s.square - product(ctx, s.along, s.along);
     j->cost = j->misfit + prior_of(ctx, j);
-    if (slopes)
+    if (slopes) {
         finish_normal(ctx, j, further, &s);
+        m->evaluated = macs;
+    }
     return macs;
 }
 
@@ -354,10 +354,10 @@ uint64_t eits_joint_return_to(eits_context *ctx, eits_joint *j)
     return eits_joint_evaluate(ctx, j, EITS_JOINT_ROUNDS);
 }
 
-uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most)
+uint64_t eits_joint_limit(const eits_context *ctx, const eits_joint *j, uint64_t most)
 {
-    const uint64_t spent = ctx->joint.spent,
-                   left = spent < EITS_JOINT_FRAME_WORK ? EITS_JOINT_FRAME_WORK - spent : 0;
+    const uint64_t all = EITS_JOINT_FRAME_WORK - (j->searches ? EITS_JOINT_AGAIN : 0),
+                   spent = ctx->joint.spent, left = spent < all ? all - spent : 0;
     return most < left ? most : left;
 }
 
@@ -381,7 +381,7 @@ void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, u
         if (!(predicted > EITS_JOINT_SETTLED) ||
             !(j->misfit < EITS_JOINT_WORSE * ctx->joint.energy) ||
             (predicted < EITS_JOINT_HOPEFUL * j->cost && j->cost - predicted > hopeless) ||
-            *macs > j->most + (j->misfit < EITS_JOINT_CLOSE * ctx->joint.energy ? j->further : 0))
+            *macs > (j->misfit < EITS_JOINT_CLOSE * ctx->joint.energy ? j->further : j->most))
             return;
         eits_joint trial = moved(ctx, j, d);
         *macs += evaluate(ctx, &trial, 1, 0, 0) + (uint64_t)n * n * (n + 6u) / 6u;

@@ -24,7 +24,7 @@ typedef struct eits_joint {
     /* those that are varied, by ascending number; the others are held (eits_joint_hold) */
     uint32_t free[EITS_MAX_TOUCHES];
     uint64_t most;    /* multiply-accumulates of settling after which no step or trial is begun */
-    uint64_t further; /* so many more where the shapes leave little */
+    uint64_t further; /* the same where the shapes leave little */
     uint32_t count, free_count;
     uint32_t searches;   /* 1: missing touches are sought */
     uint32_t parameters; /* of each: EITS_JOINT_DISC or EITS_JOINT_ELLIPSE */
@@ -73,9 +73,9 @@ eits_real eits_joint_expect(eits_context *ctx, eits_joint *j, uint64_t *macs);
 /* The same from an evaluation about *j, which is the last that was made. */
 void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, uint64_t *macs);
 
-/* The multiply-accumulates after which settling begins no step: `most`, or what the frame's joint
- * fits before it have left of EITS_JOINT_FRAME_WORK. */
-uint64_t eits_joint_limit(const eits_context *ctx, uint64_t most);
+/* The multiply-accumulates after which settling begins no step: `most`, or what the frame's touches
+ * have left of EITS_JOINT_FRAME_WORK; before the test, EITS_JOINT_AGAIN of that are kept. */
+uint64_t eits_joint_limit(const eits_context *ctx, const eits_joint *j, uint64_t most);
 
 /* Make the induced field and the normal equations about shapes that were settled before others were
  * tried, all of them free. Returns the multiply-accumulates. */
@@ -143,6 +143,11 @@ typedef struct eits_joint_change {
 
 void eits_joint_other_prior(const eits_shape *s, eits_joint_change *of);
 
+/* kinds.c: shape k, the only free one of *j (eits_joint_hold), as the other kind: *j becomes that
+ * and 1 is returned where F falls by more than `fall`. Nothing is fitted where the linearisation
+ * does not promise it. Adds to `macs`. */
+int eits_joint_turn(eits_context *ctx, eits_joint *j, uint32_t k, eits_real fall, uint64_t *macs);
+
 /* kinds.c: try each shape as the other kind where F may fall so; what lowers F stands. `settled` is
  * what one descent takes. Adds to `macs`. The normal equations are those about *j then. */
 void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled, uint64_t *macs);
@@ -183,8 +188,8 @@ typedef struct eits_joint_known {
 uint64_t eits_joint_places(eits_context *ctx, const eits_joint *j, eits_joint_known *known);
 
 /* merge.c: every group of shapes of one sign, each so near to another of it that they may be parts
- * of one, becomes one ellipse of the group's area, strength and extent. Returns how many are fewer.
- */
+ * of one, becomes one ellipse of the group's area, strength and extent. A crowd stays as it is.
+ * Returns how many are fewer. */
 uint32_t eits_joint_merge(eits_joint *j);
 
 /* Whether two shapes of one sign are nearer than so many sums of their radii. */

@@ -9,21 +9,18 @@
 #include "context/places.h"
 #include "joint/constants.h"
 
-/* Whether shape k as the other kind lowers F; *j becomes that. */
-static int turn(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *macs)
+int eits_joint_turn(eits_context *ctx, eits_joint *j, uint32_t k, eits_real fall, uint64_t *macs)
 {
     eits_joint other = *j;
     other.shape[k] = eits_joint_as_other(&j->shape[k]);
-    eits_joint_free_one(&other, k);
-    eits_joint_free_one(j, k);
-    *macs += eits_joint_hold(ctx, j, 1);
-    eits_joint_descend(ctx, &other, 2, R(INFINITY), macs);
-    if (!(j->cost - other.cost > EITS_JOINT_SETTLED)) {
-        *macs += eits_joint_restore(ctx, j, k);
-        return 0;
+    if (eits_joint_expect(ctx, &other, macs) < j->cost - fall) {
+        eits_joint_continue(ctx, &other, R(INFINITY), macs);
+        if (other.cost < j->cost - fall) {
+            *j = other;
+            return 1;
+        }
     }
-    *j = other;
-    return 1;
+    return 0;
 }
 
 void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled, uint64_t *macs)
@@ -38,7 +35,12 @@ void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled,
         if (!(known[k].other_rise < most) || *macs + settled / 2u > j->most)
             continue;
         ++tried;
-        turned += (uint32_t)turn(ctx, j, k, macs);
+        eits_joint_free_one(j, k);
+        *macs += eits_joint_hold(ctx, j, 1);
+        if (eits_joint_turn(ctx, j, k, EITS_JOINT_SETTLED, macs))
+            ++turned;
+        else
+            *macs += eits_joint_restore(ctx, j, k);
     }
     if (tried == 0)
         return;

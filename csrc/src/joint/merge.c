@@ -74,7 +74,8 @@ uint32_t eits_joint_merge(eits_joint *j)
         merged.from[count] = j->from[k];
         merged.shape[count++] = of_group(j, group, k);
     }
-    const uint32_t fewer = j->count - count;
+    /* near discs of a crowd are merged where the search finds that they are one */
+    const uint32_t fewer = count < EITS_JOINT_CROWD ? j->count - count : 0;
     if (fewer > 0) {
         merged.count = count;
         merged.parameters = EITS_JOINT_ELLIPSE;

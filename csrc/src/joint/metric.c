@@ -91,44 +91,56 @@ static uint32_t errors_above_noise(const eits_context *ctx, eits_real errors, ei
     return count;
 }
 
-/* Vectors that are multiplied at a time: with two columns their sums fit the registers of a
- * Cortex-M7. */
-enum { AT_A_TIME = 4 };
+/* Sums with four vectors. They are four variables and no array, so that a compiler keeps them in
+ * registers: with two columns at a time they fit those of a Cortex-M7. */
+typedef struct four {
+    eits_real a, b, c, d;
+} four;
 
-/* Add two columns' products with vectors i ... i + vectors - 1 of folds first ... first + count -
- * 1; their unit is missing. */
-static inline void along_vectors(const eits_row_errors *e, const eits_real *const column[2],
-                                 uint32_t first, uint32_t count, uint32_t i, uint32_t vectors,
-                                 eits_real *const along[2])
+static inline four read_four(const eits_real *along)
 {
-    const float *vector = e->vectors + (size_t)e->count * first + i;
-    eits_real sum[2][AT_A_TIME];
-    for (uint32_t c = 0; c < 2; ++c) {
-        for (uint32_t l = 0; l < vectors; ++l)
-            sum[c][l] = along[c][i + l];
-    }
-    for (uint32_t k = 0; k < count; ++k, vector += e->count) {
-        const eits_real a = column[0][k], b = column[1][k];
-        for (uint32_t l = 0; l < vectors; ++l) {
-            sum[0][l] = eits_fma(a, (eits_real)vector[l], sum[0][l]);
-            sum[1][l] = eits_fma(b, (eits_real)vector[l], sum[1][l]);
-        }
-    }
-    for (uint32_t c = 0; c < 2; ++c) {
-        for (uint32_t l = 0; l < vectors; ++l)
-            along[c][i + l] = sum[c][l];
-    }
+    return (four){along[0], along[1], along[2], along[3]};
 }
 
+static inline void write_four(eits_real *along, four s)
+{
+    along[0] = s.a;
+    along[1] = s.b;
+    along[2] = s.c;
+    along[3] = s.d;
+}
+
+static inline four plus_four(four s, eits_real x, const float *vector)
+{
+    return (four){eits_fma(x, (eits_real)vector[0], s.a), eits_fma(x, (eits_real)vector[1], s.b),
+                  eits_fma(x, (eits_real)vector[2], s.c), eits_fma(x, (eits_real)vector[3], s.d)};
+}
+
+/* Add two columns' products with the vectors in use, over folds first ... first + count - 1; their
+ * unit is missing. */
 static void along_errors(const eits_context *ctx, const eits_real *const column[2], uint32_t first,
                          uint32_t count, eits_real *const along[2])
 {
     const eits_row_errors *e = &ctx->model->row_errors;
+    const float *vectors = e->vectors + (size_t)e->count * first;
     uint32_t i = 0;
-    for (; i + AT_A_TIME <= ctx->joint.errors; i += AT_A_TIME)
-        along_vectors(e, column, first, count, i, AT_A_TIME, along);
-    for (; i < ctx->joint.errors; ++i)
-        along_vectors(e, column, first, count, i, 1, along);
+    for (; i + 4u <= ctx->joint.errors; i += 4u) {
+        four s = read_four(along[0] + i), t = read_four(along[1] + i);
+        for (uint32_t k = 0; k < count; ++k) {
+            const float *vector = vectors + (size_t)e->count * k + i;
+            s = plus_four(s, column[0][k], vector);
+            t = plus_four(t, column[1][k], vector);
+        }
+        write_four(along[0] + i, s);
+        write_four(along[1] + i, t);
+    }
+    for (; i < ctx->joint.errors; ++i) {
+        for (uint32_t c = 0; c < 2; ++c) {
+            for (uint32_t k = 0; k < count; ++k)
+                along[c][i] = eits_fma(column[c][k], (eits_real)vectors[(size_t)e->count * k + i],
+                                       along[c][i]);
+        }
+    }
 }
 
 /* M and its factor. */

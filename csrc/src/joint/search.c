@@ -16,7 +16,10 @@
 #include "joint/constants.h"
 #include "solve/violations.h"
 
-enum { CANDIDATES = 8 };
+enum {
+    CANDIDATES = 8,
+    SCORED = 3 /* evaluations that it takes to score them and to fit the best */
+};
 
 /* Whether a place lies within a shape. */
 static int is_within(const eits_joint *j, eits_real x, eits_real y)
@@ -114,13 +117,18 @@ static int with_best(eits_context *ctx, const eits_scratch *scratch, eits_joint 
     return 1;
 }
 
-/* Whether the shapes leave more than noise, and there is room for one more. Where they leave very
+/* Whether the shapes leave more than noise. */
+static int leaves_more(const eits_context *ctx, const eits_joint *j)
+{
+    return j->misfit > EITS_JOINT_SEARCHED * eits_joint_freedom(ctx, j);
+}
+
+/* Whether they do, and there is room for one more. Where they leave very
  * much they are far from any minimum. */
 static int goes_on(const eits_context *ctx, const eits_joint *j)
 {
     return j->count < ctx->options.max_touches &&
-           (j->count + 1u) * j->parameters <= EITS_JOINT_PARAMETERS &&
-           j->misfit > EITS_JOINT_SEARCHED * eits_joint_freedom(ctx, j) &&
+           (j->count + 1u) * j->parameters <= EITS_JOINT_PARAMETERS && leaves_more(ctx, j) &&
            j->misfit < EITS_JOINT_SEARCHABLE * ctx->joint.energy;
 }
 
@@ -225,15 +233,10 @@ static int try_strong(eits_context *ctx, eits_joint *j, uint64_t *macs)
     for (uint32_t k = 0; k < j->count; ++k) {
         if (!eits_joint_is_light(&j->shape[k]))
             continue;
-        eits_joint strong = *j;
-        strong.shape[k] = eits_joint_as_strong(&j->shape[k]);
-        eits_joint_free_one(&strong, k);
         eits_joint_free_one(j, k);
         *macs += eits_joint_hold(ctx, j, rounds);
-        eits_joint_descend(ctx, &strong, 2, R(INFINITY), macs);
         rounds = 0;
-        if (j->cost - strong.cost > EITS_JOINT_SHAPE_FALL) {
-            *j = strong;
+        if (eits_joint_turn(ctx, j, k, EITS_JOINT_SHAPE_FALL, macs)) {
             ++turned;
             rounds = 1;
         } else
@@ -249,13 +252,15 @@ uint64_t eits_joint_search(eits_context *ctx, const eits_scratch *scratch, eits_
                            uint64_t spent)
 {
     const uint64_t begin = spent;
-    j->most = eits_joint_limit(ctx, spent + EITS_JOINT_SEARCH_WORK);
-    while (spent < j->most && try_merged(ctx, j, &spent))
+    j->further = j->most = eits_joint_limit(ctx, j, spent + EITS_JOINT_SEARCH_WORK);
+    while (spent + ctx->joint.evaluated < j->most && try_merged(ctx, j, &spent))
         continue;
-    if (!goes_on(ctx, j) || !try_strong(ctx, j, &spent))
+    if (leaves_more(ctx, j) && !(goes_on(ctx, j) && try_strong(ctx, j, &spent)))
         spent += eits_joint_evaluate(ctx, j, 1);
-    while (goes_on(ctx, j) && spent < j->most &&
-           (try_fewer(ctx, j, &spent) || try_more(ctx, scratch, j, &spent)))
+    while (spent < j->most &&
+           (try_fewer(ctx, j, &spent) ||
+            (goes_on(ctx, j) && spent + SCORED * ctx->joint.evaluated < j->most &&
+             try_more(ctx, scratch, j, &spent))))
         continue;
     return spent - begin;
 }

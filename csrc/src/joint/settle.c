@@ -22,7 +22,7 @@ static void try_ellipses(eits_context *ctx, eits_joint *j, uint64_t *macs)
     eits_joint_back(ctx, j);
 }
 
-/* Whether touches may be missing or too many: a crowd that leaves more than noise. On a sheet that
+/* Whether touches may be missing or too many: in a crowd. On a sheet that
  * has drifted the image shows many light touches, which leave much; there nothing is sought. */
 static int may_miss(const eits_context *ctx, const eits_joint *j)
 {
@@ -30,9 +30,7 @@ static int may_miss(const eits_context *ctx, const eits_joint *j)
     for (uint32_t k = 0; k < j->count; ++k)
         strong += !eits_joint_is_light(&j->shape[k]);
     return j->searches && j->count >= EITS_JOINT_CROWD &&
-           (2u * strong > j->count ||
-            j->misfit < EITS_JOINT_LIGHT_SEARCHABLE * ctx->joint.energy) &&
-           j->misfit > EITS_JOINT_SEARCHED * eits_joint_freedom(ctx, j);
+           (2u * strong > j->count || j->misfit < EITS_JOINT_LIGHT_SEARCHABLE * ctx->joint.energy);
 }
 
 /* Search from `discs`; *j becomes what is found, where that fits better, or needs fewer touches. */
@@ -53,12 +51,12 @@ uint64_t eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_
 {
     const eits_real folds = (eits_real)eits_joint_folds(ctx);
     uint64_t macs = 0;
-    j->most = eits_joint_limit(ctx, EITS_JOINT_WORK);
-    j->further = j->searches ? EITS_JOINT_FURTHER : 0;
+    j->most = eits_joint_limit(ctx, j, EITS_JOINT_WORK);
+    j->further = eits_joint_limit(ctx, j, EITS_JOINT_WORK + (j->searches ? EITS_JOINT_FURTHER : 0));
     eits_pole_clear(ctx, j->count);
     eits_joint_free_all(j);
     eits_joint_descend(ctx, j, 2, folds + EITS_JOINT_HOPELESS, &macs);
-    j->further = 0;
+    j->further = j->most;
     if (j->parameters == EITS_JOINT_DISC) {
         const eits_joint discs = *j;
         if (j->count * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS &&

@@ -157,21 +157,6 @@ static int best_two(eits_context *ctx, const eits_joint *one, uint32_t k, eits_j
     return found;
 }
 
-/* Shape k as the other kind, light or strong, where that fits better; *j becomes that. */
-static int try_other_kind(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *spent)
-{
-    eits_joint other = *j;
-    other.shape[k] = eits_joint_as_other(&j->shape[k]);
-    eits_joint_free_one(&other, k);
-    if (!(eits_joint_expect(ctx, &other, spent) < j->cost - EITS_JOINT_SHAPE_FALL))
-        return 0;
-    eits_joint_continue(ctx, &other, R(INFINITY), spent);
-    if (!(other.cost < j->cost - EITS_JOINT_SHAPE_FALL))
-        return 0;
-    *j = other;
-    return 1;
-}
-
 /* Shape k as two, where they stand; *j becomes that. */
 static int try_two(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *spent)
 {
@@ -206,7 +191,7 @@ uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent)
     const uint64_t begin = spent;
     uint8_t tried[EITS_MAX_TOUCHES] = {0};
     uint32_t tries = 0, taken = 0, rounds = 1;
-    j->most = eits_joint_limit(ctx, spent + EITS_JOINT_SPLIT_WORK);
+    j->further = j->most = eits_joint_limit(ctx, j, spent + EITS_JOINT_SPLIT_WORK);
     while (may_split(ctx, j) && tries < EITS_JOINT_SPLIT_TRIES + taken && spent < j->most) {
         const uint32_t k = longest(j, tried);
         if (k == j->count)
@@ -219,7 +204,8 @@ uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent)
         eits_joint_free_one(j, k);
         spent += eits_joint_hold(ctx, j, rounds);
         rounds = 0;
-        if (try_other_kind(ctx, j, k, &spent) || try_two(ctx, j, k, &spent)) {
+        if (eits_joint_turn(ctx, j, k, EITS_JOINT_SHAPE_FALL, &spent) ||
+            try_two(ctx, j, k, &spent)) {
             ++taken;
             rounds = 1;
         } else

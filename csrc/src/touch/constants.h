@@ -131,7 +131,7 @@
 
 /* after which no merge and no split is tried any more [steps of a disc]. larger: crowds cost more;
  * smaller: counts stay as the image's peaks say */
-#define EITS_FIT_MOVES 240
+#define EITS_FIT_MOVES 120
 
 /* ---- Chosen: on the tuning family of the worlds (seed 42, 100 scenes of each of six sets, and
  * seed 41 of five discs 2.5 radii apart): of 187 splits that were kept with all sweeps 5 end early,
