@@ -17,7 +17,7 @@ set(EITSKIN_CORE_SOURCES
     touch/touch.c
     evidence/covariance.c evidence/shape.c evidence/likelihood.c evidence/verdict.c
     evidence/elimination.c evidence/touch_test.c
-    evidence/confidence.c evidence/ellipse.c evidence/pair.c
+    evidence/confidence.c evidence/pair.c
     multipole/taylor.c multipole/form.c multipole/induced.c multipole/rows.c joint/metric.c joint/prior.c joint/kinds.c joint/fit.c joint/settle.c joint/merge.c joint/split.c joint/search.c joint/report.c joint/begin.c
     api/setup.c api/access.c api/save.c api/frame_stage.c api/reference.c api/reconstruct.c
     api/touches.c api/batch.c api/draw.c api/self_test.c

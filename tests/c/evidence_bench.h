@@ -21,7 +21,7 @@ enum { RANK = 20, SIDE = 12, STRIDE = 24, PACKED = RANK * (RANK + 1) / 2 };
 
 static const double BOARD = 0.5; /* what the board's volts are of the model's */
 static const small_spec SPEC = {.rank = RANK, .side = SIDE, .shape = SMALL_WHITENED, .fields = 1};
-static const eits_disc ONE = {-13, 4, 12, R(0.02), 1, 0}, OTHER = {15, -8, 13, R(0.015), 1, 0};
+static const eits_disc ONE = {-13, 4, 12, R(0.02), 1}, OTHER = {15, -8, 13, R(0.015), 1};
 
 typedef struct bench {
     dense_bench b;

@@ -269,7 +269,7 @@ TEST(shapes_move_the_data_as_ellipses_do)
             expected[p][i] = (double)v[i];
     }
     eits_zero(ctx->evidence.left, STRIDE);
-    CHECK(eits_shape_columns(ctx, &ctx->scratch, &answer, 0, 0) > 0);
+    CHECK(eits_shape_columns(ctx, &ctx->scratch, &answer, 0) > 0);
     for (int p = 0; p < EITS_SHAPE_PARAMETERS; ++p) {
         const double size = sqrt(dense_dot(expected[p], expected[p], RANK)),
                      part = p == 0 ? 1 : (p < 4 ? 0 : (double)answer.shape[0][p - 4]);

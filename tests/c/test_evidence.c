@@ -88,7 +88,7 @@ static double least_without(const square *q, const eits_answer *answer, const in
  * gives. */
 TEST(leaving_out_is_solving_again_without)
 {
-    static const eits_disc third = {2, 19, 11, R(0.01), 1, 0};
+    static const eits_disc third = {2, 19, 11, R(0.01), 1};
     const eits_disc discs[] = {ONE, OTHER, third};
     const double room = BOTH_WIDTHS(3e-3, 1e-8);
     for (uint32_t count = 2; count < 4; ++count) {
@@ -271,41 +271,6 @@ TEST(what_model_errors_could_have_made_goes)
         CHECK_NEAR(f.disc[0].y_mm, ONE.y_mm, errs ? 1 : 0);
         CHECK(errs || memcmp(f.disc, discs, sizeof discs) == 0);
     }
-}
-
-/* With the columns of discs available, those of their shapes alone are made, to the same bits. */
-TEST(columns_of_discs_serve_for_their_shapes)
-{
-    static const eits_disc discs[] = {ONE, OTHER};
-    eits_real column[2 * EITS_SHAPE_PARAMETERS * STRIDE], left[STRIDE];
-    eits_likelihood now[2];
-    uint64_t cost[2];
-    for (uint32_t known = 0; known < 2; ++known) {
-        eits_context *ctx = set_up(&b, 1);
-        eits_real log_determinant;
-        uint64_t macs = 0;
-        eits_likelihood as_discs;
-        stage_discs(&b, discs, 2);
-        CHECK(eits_factor_covariance(ctx, &ctx->scratch, 0, &log_determinant, &macs));
-        eits_copy(ctx->evidence.data, ctx->frame.y, STRIDE);
-        eits_answer answer = answer_of(discs, 2, EITS_PLACE_PARAMETERS);
-        (void)eits_linearise(ctx, &ctx->scratch, &answer, &as_discs);
-        answer.parameters = EITS_SHAPE_PARAMETERS;
-        ctx->evidence.columns_made = 0;
-        ctx->evidence.places_made = known;
-        cost[known] = eits_linearise(ctx, &ctx->scratch, &answer, &now[known]);
-        CHECK_EQUAL(ctx->evidence.columns_made, known ? 8 : 16);
-        CHECK_EQUAL(ctx->evidence.places_made, 0);
-        if (known) {
-            CHECK(memcmp(column, ctx->evidence.column, sizeof column) == 0);
-            CHECK(memcmp(left, ctx->evidence.left, sizeof left) == 0);
-        }
-        memcpy(column, ctx->evidence.column, sizeof column);
-        memcpy(left, ctx->evidence.left, sizeof left);
-    }
-    CHECK(cost[1] < cost[0]);
-    CHECK(now[0].here == now[1].here && now[0].least == now[1].least);
-    CHECK(memcmp(now[0].step, now[1].step, 16 * sizeof now[0].step[0]) == 0);
 }
 
 /* What the fit has taken is taken from the test; some is left to it. */

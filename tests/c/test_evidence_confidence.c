@@ -158,7 +158,7 @@ TEST(two_lie_on_the_line_of_the_bulge)
 {
     eits_likelihood likelihood = {.count = 2 * EITS_SHAPE_PARAMETERS};
     eits_answer one = {.count = 2, .parameters = EITS_SHAPE_PARAMETERS}, two;
-    const eits_disc disc = {5, -3, 8, R(0.02), 1, 0};
+    const eits_disc disc = {5, -3, 8, R(0.02), 1};
     one.disc[0] = one.disc[1] = disc;
     one.shape[0][0] = R(0.1);
     eits_real line[2];
@@ -191,83 +191,6 @@ TEST(two_lie_on_the_line_of_the_bulge)
     one.parameters = EITS_PLACE_PARAMETERS;
     eits_pair_line(&one, &likelihood, 0, line);
     CHECK(line[0] == 0 && line[1] == 0);
-}
-
-/* An axis at some angle, found by its dipole's evidence: its direction, and its length by hand; an
- * insulating touch lies across. */
-TEST(an_ellipse_lies_along_its_dipole)
-{
-    enum { N = EITS_SHAPE_PARAMETERS };
-    eits_likelihood likelihood = {.count = N};
-    eits_scratch scratch = ctx->scratch;
-    eits_real square[N * N] = {0}, axis[2];
-    scratch.square = square;
-    square[6 * N + 6] = R(0.001);
-    square[7 * N + 7] = R(0.002);
-    square[6 * N + 7] = square[7 * N + 6] = R(0.0005);
-    const double d = 0.15, e = (double)EITS_ELLIPSE_MOST * d / (d + (double)EITS_ELLIPSE_HALF),
-                 determinant = 0.001 * 0.002 - 0.0005 * 0.0005;
-    for (int k = -17; k <= 18; ++k) {
-        const double angle = k * 3.14159265358979 / 36, u = d * cos(2 * angle),
-                     v = d * sin(2 * angle),
-                     rise = (0.002 * u * u - 2 * 0.0005 * u * v + 0.001 * v * v) / determinant;
-        for (int sign = -1; sign <= 1; sign += 2) {
-            eits_answer answer = {.count = 1, .parameters = N};
-            answer.disc[0].polarity = (eits_real)sign;
-            answer.shape[0][2] = R(0.05);
-            likelihood.step[6] = (eits_real)(sign * u - 0.05);
-            likelihood.step[7] = (eits_real)(sign * v);
-            const double enough = rise / (double)EITS_ELLIPSE_EVIDENCE;
-            eits_long_axis(&scratch, &answer, &likelihood, 0, (eits_real)(1.01 * enough), axis);
-            CHECK(axis[0] == 0 && axis[1] == 0);
-            eits_long_axis(&scratch, &answer, &likelihood, 0, (eits_real)(0.99 * enough), axis);
-            const double along = (double)axis[0] * cos(angle) + (double)axis[1] * sin(angle);
-            CHECK_NEAR(fabs(along), sqrt((1 + e) / (1 - e)), 1e-3);
-            CHECK_NEAR((double)axis[0] * sin(angle), (double)axis[1] * cos(angle), 2e-3);
-        }
-    }
-    eits_answer without = {.count = 1, .parameters = EITS_EDGE_PARAMETERS};
-    axis[0] = axis[1] = 1;
-    eits_long_axis(&scratch, &without, &likelihood, 0, 0, axis);
-    CHECK(axis[0] == 0 && axis[1] == 0);
-    eits_answer unknown = {.count = 1, .parameters = N};
-    square[6 * N + 6] = 0;
-    eits_long_axis(&scratch, &unknown, &likelihood, 0, 0, axis);
-    CHECK(axis[0] == 0 && axis[1] == 0);
-}
-
-/* An ellipse is reported where the test has it, as long as that is on the skin, and with more of
- * the radius that its strength suggests; a disc as it is. */
-TEST(an_ellipse_is_reported_where_the_test_has_it)
-{
-    const eits_disc disc = {3, -2, 8, R(0.02), 1, 0};
-    const eits_real axis[2] = {R(0.75), R(-1.25)}, none[2] = {0, 0};
-    const double reach = (double)EITS_MAX_MOVE * (double)ctx->model->pixel_mm;
-    const double apart[][2] = {{0.5, -1}, {1e6, 0.25}, {(double)NAN, 0}, {0.5, -1}, {0.5, -1}};
-    for (int i = 0; i < 5; ++i) {
-        const int is_long = i != 2 && i != 3, knows = i != 4;
-        CHANGE_OPTIONS(ctx, o.touch_change_s_per_m = knows ? R(0.045) : 0);
-        eits_fit f = {.count = 1, .tested = 1, .disc = {disc}};
-        f.apart_mm[0][0] = (eits_real)apart[i][0];
-        f.apart_mm[0][1] = (eits_real)apart[i][1];
-        eits_place_ellipse(ctx, &disc, i == 3 ? none : axis, &f, 0);
-        eits_touch touch;
-        CHECK_EQUAL(eits_report_touches(ctx, &f, &touch), 1);
-        const double expected = 8 * sqrt(0.02 / 0.045),
-                     radius = 8 + (knows ? (double)EITS_ELLIPSE_EXPECTED * (expected - 8) : 0);
-        CHECK_NEAR((double)touch.x_mm, is_long ? 3 + fmin(apart[i][0], reach) : 3, 1e-5);
-        CHECK_NEAR((double)touch.y_mm, is_long ? -2 + apart[i][1] : -2, 1e-5);
-        CHECK_NEAR((double)touch.radius_mm, is_long ? radius : 8, 1e-5);
-        CHECK_NEAR((double)touch.long_x_mm, is_long ? 0.75 * radius : 0, 1e-5);
-        CHECK_NEAR((double)touch.long_y_mm, is_long ? -1.25 * radius : 0, 1e-5);
-    }
-    eits_disc edge = disc;
-    while (eits_disc_on_skin(ctx, &edge))
-        edge.x_mm += R(0.5);
-    edge.x_mm -= R(0.5);
-    eits_fit f = {.count = 1, .tested = 1, .disc = {edge}, .apart_mm = {{2, 1}}};
-    eits_place_ellipse(ctx, &edge, axis, &f, 0);
-    CHECK(f.ellipse_mm[0][0] == edge.x_mm && f.ellipse_mm[0][1] == edge.y_mm);
 }
 
 int main(void)

@@ -15,7 +15,7 @@ enum { RANK = 16, SIDE = 12, L = SMALL_ELECTRODES };
 static const double PIXEL = 6, PI = 3.14159265358979323846;
 static const small_spec WITH_FIELDS = {.rank = RANK, .side = SIDE, .fields = 1};
 static const eits_disc THREE[] = {
-    {-14, 3, 8, R(0.02), 1, 0}, {9, 11, 6, R(-0.01), -1, 0}, {5, -17, 10, R(0.03), 1, 0}};
+    {-14, 3, 8, R(0.02), 1}, {9, 11, 6, R(-0.01), -1}, {5, -17, 10, R(0.03), 1}};
 
 /* A context with a frame's data, where rows of fold `left_out` (below 0: none) are not in use. */
 static eits_context *open_bench(dense_bench *b, small_spec spec, int left_out)
@@ -213,8 +213,7 @@ TEST(distance_and_overlap)
                                               ? 0
                                               : 0x3800u + (r < L ? 37 * r : 5 * (r - L) * (r - L)));
     }
-    eits_disc two[2] = {{-18, 0, 6, R(0.03), 1, 0},
-                        {-6, 0, 6, R(0.03), 1, 0}}; /* where they touch */
+    eits_disc two[2] = {{-18, 0, 6, R(0.03), 1}, {-6, 0, 6, R(0.03), 1}}; /* where they touch */
     interplay(ctx, two, 2, near, &macs);
     CHECK(size_of(near) > 0);
     const double tolerance = (4 * EPS * 10 + 1e-6) * size_of(near) + 40 * EPS;
@@ -280,9 +279,9 @@ TEST(when_it_is_left_alone)
     eits_disc many[6] = {THREE[0],
                          THREE[1],
                          THREE[2],
-                         {-20, -20, 5, R(0.01), 1, 0},
-                         {20, 20, 5, R(0.01), 1, 0},
-                         {20, -4, 5, R(0.01), 1, 0}};
+                         {-20, -20, 5, R(0.01), 1},
+                         {20, 20, 5, R(0.01), 1},
+                         {20, -4, 5, R(0.01), 1}};
     ctx = open_bench(&b, low, -1);
     CHECK(!left_alone(ctx, many, 5));
     CHECK(left_alone(ctx, many, 6));

@@ -61,21 +61,21 @@ TEST(touches_that_the_image_does_not_show_are_found)
         eits_sign sign;
         eits_disc disc[6];
     } cases[] = {
-        {1, EITS_SIGN_INCREASE, {{-21, 9, 9, R(0.05), 1, 0}}},
-        {2, EITS_SIGN_INCREASE, {{-21, 9, 9, R(0.05), 1, 0}, {27, -15, 9, R(0.01), 1, 0}}},
+        {1, EITS_SIGN_INCREASE, {{-21, 9, 9, R(0.05), 1}}},
+        {2, EITS_SIGN_INCREASE, {{-21, 9, 9, R(0.05), 1}, {27, -15, 9, R(0.01), 1}}},
         /* what answers most lies between them */
-        {2, EITS_SIGN_INCREASE, {{-10, 3, 9, R(0.05), 1, 0}, {12, 3, 9, R(0.05), 1, 0}}},
-        {2, EITS_SIGN_DECREASE, {{-21, 9, 9, R(-0.05), -1, 0}, {27, -15, 9, R(-0.02), -1, 0}}},
-        {2, EITS_SIGN_BOTH, {{-21, 9, 9, R(0.05), 1, 0}, {27, -15, 9, R(-0.04), -1, 0}}},
+        {2, EITS_SIGN_INCREASE, {{-10, 3, 9, R(0.05), 1}, {12, 3, 9, R(0.05), 1}}},
+        {2, EITS_SIGN_DECREASE, {{-21, 9, 9, R(-0.05), -1}, {27, -15, 9, R(-0.02), -1}}},
+        {2, EITS_SIGN_BOTH, {{-21, 9, 9, R(0.05), 1}, {27, -15, 9, R(-0.04), -1}}},
         /* more than are exchanged */
         {6,
          EITS_SIGN_INCREASE,
-         {{-39, -39, 9, R(0.05), 1, 0},
-          {39, -39, 9, R(0.045), 1, 0},
-          {-39, 39, 9, R(0.04), 1, 0},
-          {39, 39, 9, R(0.05), 1, 0},
-          {0, 0, 9, R(0.04), 1, 0},
-          {3, -45, 9, R(0.05), 1, 0}}},
+         {{-39, -39, 9, R(0.05), 1},
+          {39, -39, 9, R(0.045), 1},
+          {-39, 39, 9, R(0.04), 1},
+          {39, 39, 9, R(0.05), 1},
+          {0, 0, 9, R(0.04), 1},
+          {3, -45, 9, R(0.05), 1}}},
     };
     for (size_t c = 0; IN_TABLE(c, cases); ++c) {
         eits_touch touch[EITS_MAX_TOUCHES];
@@ -93,7 +93,7 @@ TEST(touches_that_the_image_does_not_show_are_found)
 
 TEST(what_explains_too_little_is_no_touch)
 {
-    const eits_disc disc[2] = {{-21, 9, 9, R(0.05), 1, 0}, {27, -15, 9, R(0.02), 1, 0}};
+    const eits_disc disc[2] = {{-21, 9, 9, R(0.05), 1}, {27, -15, 9, R(0.02), 1}};
     eits_touch touch[EITS_MAX_TOUCHES];
     eits_context *ctx = pressed(disc, 2, EITS_SIGN_INCREASE);
     /* it explains a seventh */
@@ -117,18 +117,14 @@ TEST(a_disc_a_whole_pixel_beyond_the_rim_is_no_touch)
         uint32_t count;
     } cases[] = {{R(0.99), 1}, {R(0.9999), 0}, {1, 0}, {R(1.0001), 0}};
     for (size_t c = 0; IN_TABLE(c, cases); ++c) {
-        const eits_disc at = {0, 0, 9, R(0.05), 1, 0};
+        const eits_disc at = {0, 0, 9, R(0.05), 1};
         eits_context *ctx = pressed(&at, 1, EITS_SIGN_INCREASE);
         const eits_model *model = ctx->model;
         const eits_real pixel = (eits_real)model->pixel_mm;
         eits_fit f = eits_fit_none(ctx, &ctx->scratch);
         f.disc[0] =
             (eits_disc){(eits_real)model->origin_x_mm + (SIDE - R(0.5) + cases[c].beyond) * pixel,
-                        (eits_real)model->origin_y_mm + R(9.5) * pixel,
-                        2 * pixel,
-                        0,
-                        1,
-                        0};
+                        (eits_real)model->origin_y_mm + R(9.5) * pixel, 2 * pixel, 0, 1};
         (void)eits_disc_atom(ctx, &ctx->scratch, &f.disc[0], ctx->frame.y, NULL);
         f.total = eits_dot(ctx->kernels, ctx->frame.y, ctx->frame.y, RANK);
         f.count = 1;
@@ -155,7 +151,7 @@ static void answer(eits_context *ctx, const eits_touch *touch, double dx, double
 /* C = unit (G'G)^-1, G by finite differences, beside the answers of both touches. */
 TEST(a_place_is_as_sure_as_the_fit_and_the_models_factor_say)
 {
-    static const eits_disc disc[2] = {{-10, 3, 9, R(0.05), 1, 0}, {14, 3, 9, R(0.05), 1, 0}};
+    static const eits_disc disc[2] = {{-10, 3, 9, R(0.05), 1}, {14, 3, 9, R(0.05), 1}};
     const double step = sizeof(eits_real) == 4 ? 0.02 : 1e-4, factor = 2.5;
     eits_touch touch[EITS_MAX_TOUCHES];
     eits_context *ctx = pressed(disc, 2, EITS_SIGN_INCREASE);
@@ -170,7 +166,7 @@ TEST(a_place_is_as_sure_as_the_fit_and_the_models_factor_say)
     CHECK(unit > 0);
     for (int k = 0; k < 2; ++k) {
         double g[2][RANK], back[RANK], both[2 * RANK], h[3];
-        const eits_disc at = {touch[k].x_mm, touch[k].y_mm, touch[k].radius_mm, 0, 1, 0};
+        const eits_disc at = {touch[k].x_mm, touch[k].y_mm, touch[k].radius_mm, 0, 1};
         const double change = (double)(touch[k].strength_s_per_m_mm2 / eits_disc_area(ctx, &at));
         for (int axis = 0; axis < 2; ++axis) {
             const double dx = axis == 0 ? step : 0, dy = axis == 1 ? step : 0;
@@ -194,7 +190,7 @@ TEST(a_place_is_as_sure_as_the_fit_and_the_models_factor_say)
 /* A touch that nothing is left beside has no place to be unsure of. */
 TEST(without_a_residual_a_place_is_not_rated)
 {
-    static const eits_disc disc = {-21, 9, 9, R(0.05), 1, 0};
+    static const eits_disc disc = {-21, 9, 9, R(0.05), 1};
     eits_context *ctx = pressed(&disc, 1, EITS_SIGN_INCREASE);
     eits_fit f = eits_fit_none(ctx, &ctx->scratch);
     b.c.model.place_factor = 1;
@@ -267,7 +263,7 @@ static eits_fit one_left(eits_context *ctx, double confidence)
     eits_fit f = eits_fit_none(ctx, &ctx->scratch);
     ctx->reference.far = f.count = f.tested = 1;
     f.confidence[0] = (eits_real)confidence;
-    f.disc[0] = (eits_disc){40, 40, 3, R(0.01), 1, 0};
+    f.disc[0] = (eits_disc){40, 40, 3, R(0.01), 1};
     f.place_mm2[0][0] = f.place_mm2[0][2] = f.long_mm[0][1] = 9;
     eits_fit_restart(ctx, &ctx->scratch, &f);
     return f;
@@ -300,8 +296,8 @@ TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
     const eits_sign signs[] = {EITS_SIGN_INCREASE, EITS_SIGN_DECREASE, EITS_SIGN_BOTH};
     for (int k = 0; k < 6; ++k) {
         const int down = k % 3 == 1 || k == 5;
-        const eits_disc at[2] = {{-21, 9, 11, down ? R(-0.05) : R(0.05), 1, 0},
-                                 {18, -14, 8, down ? R(0.01) : R(-0.01), 1, 0}};
+        const eits_disc at[2] = {{-21, 9, 11, down ? R(-0.05) : R(0.05), 1},
+                                 {18, -14, 8, down ? R(0.01) : R(-0.01), 1}};
         eits_context *ctx = pressed(at, k < 3 ? 1 : 2, signs[k % 3]);
         double *y = dense_copy(ctx->frame.y, RANK), *image = dense_numbers(b.d.n), peak = 0;
         const double origin[2] = {0, 0};
@@ -326,7 +322,7 @@ TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
                 (double)EITS_CENTRE_SPREAD *
                     (moment(ctx, image, peak, middle, i / 2, (i + 1) / 2) + (i == 1 ? 0 : own)),
                 1e-2);
-        CHECK(f.long_mm[0][1] == 0 && f.count == 1);
+        CHECK_EQUAL(f.count, 1);
         free(y);
         free(image);
     }
@@ -337,10 +333,10 @@ TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
  * test left it. */
 TEST(other_touches_stay)
 {
-    static const eits_disc at[] = {{-21, 9, 11, R(0.05), 1, 0},
-                                   {9, 9, 11, R(0.05), 1, 0},
-                                   {-6, 9, 11, R(-0.1), -1, 0},
-                                   {0, 0, 90, R(-0.01), -1, 0}};
+    static const eits_disc at[] = {{-21, 9, 11, R(0.05), 1},
+                                   {9, 9, 11, R(0.05), 1},
+                                   {-6, 9, 11, R(-0.1), -1},
+                                   {0, 0, 90, R(-0.01), -1}};
     for (int k = 0; k < 8; ++k) {
         eits_context *ctx = pressed(at + (k == 7 ? 3 : 0), k == 6 ? 3 : 1, EITS_SIGN_INCREASE);
         eits_fit f = one_left(ctx, k == 0 ? (double)EITS_CENTRE_SURE : 0.5);

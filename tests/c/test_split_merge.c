@@ -80,7 +80,7 @@ static void check_residual(eits_context *ctx, const eits_fit *f)
 static void two_halves_become_one(int first)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
-    const eits_disc one = {3, -3, 9, R(0.05), 1, 0}, far = {-39, 33, 9, R(0.05), 1, 0};
+    const eits_disc one = {3, -3, 9, R(0.05), 1}, far = {-39, 33, 9, R(0.05), 1};
     const eits_disc truth[2] = {one, far};
     press(ctx, truth, 2);
     eits_disc halves[3] = {one, far, one};
@@ -104,8 +104,8 @@ TEST(two_touches_stay_two)
     static const eits_real distances[] = {20, 24, 36};
     for (int d = 0; d < 3; ++d) {
         eits_context *ctx = dense_bench_open(&b, WAVES, 0);
-        const eits_disc truth[2] = {{-distances[d] / 2, 3, 9, R(0.05), 1, 0},
-                                    {distances[d] / 2, 3, 9, R(0.04), 1, 0}};
+        const eits_disc truth[2] = {{-distances[d] / 2, 3, 9, R(0.05), 1},
+                                    {distances[d] / 2, 3, 9, R(0.04), 1}};
         press(ctx, truth, 2);
         eits_fit f = begin(ctx, truth, 2);
         CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
@@ -124,7 +124,7 @@ TEST(two_touches_stay_two)
 TEST(opposite_signs_are_never_one)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
-    const eits_disc truth[2] = {{-3, 3, 9, R(0.05), 1, 0}, {3, 3, 9, R(-0.05), -1, 0}};
+    const eits_disc truth[2] = {{-3, 3, 9, R(0.05), 1}, {3, 3, 9, R(-0.05), -1}};
     press(ctx, truth, 2);
     eits_fit f = begin(ctx, truth, 2);
     CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
@@ -137,7 +137,7 @@ TEST(opposite_signs_are_never_one)
 TEST(three_thirds_become_one)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
-    const eits_disc one = {3, 3, 12, R(0.05), 1, 0};
+    const eits_disc one = {3, 3, 12, R(0.05), 1};
     press(ctx, &one, 1);
     eits_disc thirds[3] = {one, one, one};
     for (int k = 0; k < 3; ++k)
@@ -155,13 +155,13 @@ TEST(one_disc_over_two_touches_becomes_two)
     for (int d = 0; d < 4; ++d) {
         eits_context *ctx = dense_bench_open(&b, WAVES, 0);
         eits_disc truth[3] = {
-            {0, 0, 9, R(0.05), 1, 0}, {0, 0, 9, R(0.05), 1, 0}, {-42, -36, 9, R(0.05), 1, 0}};
+            {0, 0, 9, R(0.05), 1}, {0, 0, 9, R(0.05), 1}, {-42, -36, 9, R(0.05), 1}};
         for (int k = 0; k < 2; ++k) {
             truth[k].x_mm = R(4.0) + (k ? -14 : 14) * along[d][0];
             truth[k].y_mm = R(6.0) + (k ? -14 : 14) * along[d][1];
         }
         press(ctx, truth, 3);
-        const eits_disc seen[2] = {truth[2], {4, 6, 14, R(0.04), 1, 0}};
+        const eits_disc seen[2] = {truth[2], {4, 6, 14, R(0.04), 1}};
         eits_fit f = begin(ctx, seen, 2);
         eits_fit_move_all(ctx, &ctx->scratch, &f, 3);
         CHANGE_OPTIONS(ctx, o.max_touches = 2);
@@ -183,8 +183,8 @@ TEST(one_disc_over_two_touches_becomes_two)
 TEST(a_split_that_gains_little_is_undone)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
-    const eits_disc truth[2] = {{-10, 6, 9, R(0.05), 1, 0}, {18, 6, 9, R(0.05), 1, 0}},
-                    one = {4, 6, 14, R(0.04), 1, 0};
+    const eits_disc truth[2] = {{-10, 6, 9, R(0.05), 1}, {18, 6, 9, R(0.05), 1}},
+                    one = {4, 6, 14, R(0.04), 1};
     eits_real rest[RANK];
     uint64_t state = 8;
     for (int i = 0; i < RANK; ++i)
@@ -210,23 +210,18 @@ TEST(one_large_touch_stays_one)
     int given_up = 0;                      /* before the sweep over all */
     for (int rest = 0; rest < 4; ++rest) { /* whatever else is in the data */
         eits_context *ctx = dense_bench_open(&b, WAVES, 0);
-        const eits_disc truth[2] = {{3, 5, 20, R(0.05), 1, 0}, {-39, -33, 9, others[rest], 1, 0}};
+        const eits_disc truth[2] = {{3, 5, 20, R(0.05), 1}, {-39, -33, 9, others[rest], 1}};
         press(ctx, truth, 2);
         eits_fit f = begin(ctx, truth, 1);
         const eits_disc before = f.disc[0];
         CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), 0);
         CHECK_EQUAL(f.count, 1);
         CHECK((f.macs > 0) == (rest > 0)); /* nothing left: nothing is tried */
-        eits_disc after = f.disc[0];
         const uint32_t moves = f.moves;
-        CHECK_EQUAL(after.whole, moves > 0);
         given_up += moves > 0 && moves <= 2 * EITS_SPLIT_SWEEPS;
-        after.whole = 0;
-        CHECK(memcmp(&before, &after, sizeof before) == 0);
+        CHECK(memcmp(&before, &f.disc[0], sizeof before) == 0);
         check_residual(ctx, &f);
-        CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), 0);
-        CHECK_EQUAL(f.moves, moves); /* what was fitted as two is not fitted so again */
-        f.noise = f.total;           /* all that is left may be noise */
+        f.noise = f.total; /* all that is left may be noise */
         f.macs = 0;
         CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), 0);
         CHECK_EQUAL(f.macs, 0);
@@ -237,8 +232,8 @@ TEST(one_large_touch_stays_one)
 /* Once the fit has made as many moves as it may, discs stay as many as they are. */
 TEST(moves_are_bounded)
 {
-    const eits_disc near[2] = {{-10, 6, 9, R(0.05), 1, 0}, {12, 6, 9, R(0.05), 1, 0}},
-                    one = {1, 6, 14, R(0.04), 1, 0};
+    const eits_disc near[2] = {{-10, 6, 9, R(0.05), 1}, {12, 6, 9, R(0.05), 1}},
+                    one = {1, 6, 14, R(0.04), 1};
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
     press(ctx, near, 2);
     for (uint32_t left = 0; left < 2; ++left) {
@@ -268,7 +263,7 @@ TEST(one_peak_two_touches)
 {
     eits_touch touch[EITS_MAX_TOUCHES];
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
-    const eits_disc truth[2] = {{-13, 3, 9, R(0.05), 1, 0}, {15, 3, 9, R(0.05), 1, 0}};
+    const eits_disc truth[2] = {{-13, 3, 9, R(0.05), 1}, {15, 3, 9, R(0.05), 1}};
     press(ctx, truth, 2);
     CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     for (uint32_t j = 0; j < b.c.model.n_pixels; ++j) /* one peak */
@@ -286,7 +281,7 @@ TEST(one_peak_two_touches)
 
 /* ---- the image solved again ---- */
 
-static const eits_disc PAIR[2] = {{-21, 9, 9, R(0.05), 1, 0}, {21, 3, 9, R(0.05), 1, 0}};
+static const eits_disc PAIR[2] = {{-21, 9, 9, R(0.05), 1}, {21, 3, 9, R(0.05), 1}};
 
 static eits_context *open_pair(dense_bench *b, small_spec spec, uint32_t second_pass,
                                uint32_t mac_limit)

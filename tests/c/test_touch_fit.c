@@ -26,7 +26,7 @@ static eits_context *set_up(small_model *made, small_context *c)
  * that the first covers. */
 static uint64_t press(eits_context *ctx, int both)
 {
-    const eits_disc discs[2] = {{-27, 3, 9, R(0.05), 1, 0}, {33, -3, 9, R(0.02), 1, 0}};
+    const eits_disc discs[2] = {{-27, 3, 9, R(0.05), 1}, {33, -3, 9, R(0.02), 1}};
     eits_real atom[RANK];
     uint64_t covered = 0;
     memset(ctx->frame.y, 0, RANK * sizeof *ctx->frame.y);
@@ -144,7 +144,7 @@ TEST(explained_is_what_leaving_out_costs)
     CHECK_EQUAL(eits_solve(ctx, NULL), EITS_OK);
     ctx->info.stop = EITS_STOP_ITERATIONS; /* an image made by hand, the empty peak the highest */
     for (int k = 0; k < 4; ++k) {
-        const eits_disc disc = {(eits_real)places[k][0], (eits_real)places[k][1], 12, 1, 1, 0};
+        const eits_disc disc = {(eits_real)places[k][0], (eits_real)places[k][1], 12, 1, 1};
         (void)eits_disc_atom(ctx, &ctx->scratch, &disc, atom, NULL);
         for (int i = 0; i < RANK; ++i) {
             atoms[k * RANK + i] = (double)atom[i];
@@ -186,7 +186,7 @@ TEST(each_touch_must_exceed_the_detection_threshold)
     dense d = dense_of(&c.model);
     CHANGE_OPTIONS(ctx, o.touch_sweeps = 0, o.touch_min_fraction = 0, o.lambda_noise_factor = 0,
                    o.detection_factor = 1);
-    const eits_disc weak = {33, -3, 9, R(0.02), 1, 0};
+    const eits_disc weak = {33, -3, 9, R(0.02), 1};
     eits_real atom[RANK];
     (void)eits_disc_atom(ctx, &ctx->scratch, &weak, atom, NULL);
     double *part = dense_copy(atom, RANK), max = 0;
@@ -220,7 +220,7 @@ TEST(radius_by_the_data_or_by_the_noise)
         uint32_t count;
         CHANGE_OPTIONS(ctx, o.touch_radius_weight = 0, o.touch_seed_radius_mm = 9,
                        o.touch_change_s_per_m = 0, o.max_touches = 1, o.touch_sweeps = 60);
-        const eits_disc disc = {-25, 2, 12, R(0.05), 1, 0};
+        const eits_disc disc = {-25, 2, 12, R(0.05), 1};
         (void)eits_disc_atom(ctx, &ctx->scratch, &disc, ctx->frame.y, NULL);
         for (int i = 0; i < RANK; ++i)
             ctx->frame.y[i] *= disc.change;

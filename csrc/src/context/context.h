@@ -197,10 +197,8 @@ typedef struct eits_evidence {
     eits_real *gain_drift; /* stride: R'^-1 of the projection's direction, of length 1 */
     uint32_t drifts;       /* 1: it is in force */
     uint32_t columns_made; /* since the test of this frame began */
-    uint32_t columns_kept; /* that it did not have to make again */
     uint32_t columns_most; /* in what is being tried; 0: any number */
     uint32_t spent;        /* 1: the test wanted more columns than options.test_columns allows */
-    uint32_t places_made;  /* 1: column has those of the next answer's discs without their shapes */
 } eits_evidence;
 
 /* Memory of the multipole model: L electrodes, slots of EITS_POLE_FIELD(L) numbers. Written by

@@ -30,10 +30,6 @@
 /* of its dipole terms, .2 of the disc's [1 / deviation^2]. as SHAPE_PRECISION */
 #define EITS_DIPOLE_PRECISION R(25.0)
 
-/* pairs so near each other may be one touch [of the sum of radii]. larger: costs; smaller: halves
- * of a touch stay two */
-#define EITS_MERGE_REACH R(1.2)
-
 /* of Gauss and Newton, for each simpler answer [steps]. larger: costs; smaller: an answer is judged
  * before it is fitted */
 #define EITS_REFIT_STEPS 5
@@ -64,25 +60,12 @@
  * more frames are crowded; smaller: the linearisation alone decides */
 #define EITS_CLEAR R(1.5)
 
-/* ---- Chosen: on the tuning family of the worlds (seeds 21 to 23, 200 scenes a set): with 10, 25
- * and 45 of fingers 92.7, 95.3 and 95.7 % are exact, of ellipses 93.8, 95.8 and 95.8 %; false
- * touches at the rim beyond a long one rise by 10 to 33 thresholds. Of five discs 2.5 radii apart
- * (350 scenes) one more is wrong from 30 on. Check: eitskin bench worlds */
-
-/* the same where shapes are not even looked at [of the threshold]. larger: costs; smaller: shapes
- * become touches */
-#define EITS_CLEAR_AS_DISCS R(30.0)
-
 /* ---- Chosen: on the tuning family of the worlds (seed 1, 40 scenes a set): true touches of discs
  * rise by at least 26 thresholds, false ones elsewhere by up to 36, where the excess is above 2.
  * Check: eitskin bench worlds */
 
-/* so much is the weaker of a near pair worth at most where it may be one touch [of the threshold].
- * larger: costs; smaller: halves of a touch stay two */
-#define EITS_CLEAR_OF_MANY R(10.0)
-
-/* excess up to which shapes are not even looked at where the discs are clear without. larger:
- * shapes become touches; smaller: costs */
+/* excess of the first look up to which the test goes on without asking whether the skin has
+ * drifted. larger: drift becomes touches; smaller: costs */
 #define EITS_FITS_AS_DISCS R(4.0)
 
 /* excess of what stays up to which no drift of the skin is thought of. larger: drift becomes
@@ -132,21 +115,6 @@
 /* of all discs, up to which they get shapes [columns]. larger: crowds cost more; smaller: shapes in
  * crowds become touches */
 #define EITS_SHAPE_COLUMNS 48
-
-/* ---- Chosen: on the tuning family of the worlds (seed 11, 100 scenes a set): long touches found
- * as two, by reaches of 1.2 to 2.2 and 3, 4 or all discs; of five discs 2.5 radii apart none is
- * lost. Check: eitskin bench worlds */
-
-/* up to which pairs are tried as one long touch [discs]. larger: crowds cost more; smaller: long
- * touches become two */
-#define EITS_FEW_DISCS 3
-
-/* MERGE_REACH where there are few [of the sum of radii]. as there */
-#define EITS_REACH_OF_FEW R(2.2)
-
-/* so much is the weaker of such a pair worth at most [of the threshold]. larger: costs; smaller:
- * long touches become two */
-#define EITS_CLEAR_OF_FEW R(60.0)
 
 /* ---- Chosen: on the tuning family of the worlds (seeds 1 and 2): logistic regression of found
  * touches, true or false, on the logarithm of their rise; factors and floor of places (seeds 21 and
@@ -198,10 +166,6 @@
 /* of its square. as PAIR_BULGE */
 #define EITS_PAIR_GROWTH_2 R(-30.31)
 
-/* up to which discs explain the data as they are: no shapes [of the rank]. larger: pairs are not
- * noticed; smaller: costs */
-#define EITS_PAIR_MISFIT R(0.6)
-
 /* above which a touch may be two [log odds]. larger: fewer frames are crowded */
 #define EITS_PAIR_ODDS R(1.0)
 
@@ -233,31 +197,6 @@
 
 /* below which a touch may be none. larger: more frames are crowded */
 #define EITS_MIN_CONFIDENCE R(0.7)
-
-/* ---- Chosen: on the tuning family of the worlds (seed 2, 60 scenes a set): of 700 discs none is
- * called an ellipse, of 240 ellipses and fingers three quarters are; the aspect's median error is 5
- * %. Check: eitskin study other-worlds */
-
-/* a touch is called an ellipse where the rise of F without its dipole terms, over its excess, is
- * more than this. larger: ellipses are called discs; smaller: discs are called ellipses */
-#define EITS_ELLIPSE_EVIDENCE R(12.0)
-
-/* (aspect - 1) / (aspect + 1) = this times d / (d + ELLIPSE_HALF), d the length of its dipole
- * terms. larger: ellipses are longer */
-#define EITS_ELLIPSE_MOST R(0.63)
-
-/* as ELLIPSE_MOST [of the disc's dipole]. larger: ellipses are rounder */
-#define EITS_ELLIPSE_HALF R(0.2)
-
-/* ---- Chosen: on the tuning family of the worlds (seed 21, 200 scenes of ellipses and of fingers):
- * of 0, .3, .5, .6, .7 and .8 the one by which the radii of those said to be ellipses are nearest
- * to the true ones: .079 off in the mean of the logarithm, with 0 .110. Check: eitskin study
- * other-worlds */
-
-/* how much of an ellipse's radius is what its strength suggests (option touch_change_s_per_m), and
- * not what a disc fits best with. larger: light ellipses are too small; smaller: a shape's misfit
- * is in the radius */
-#define EITS_ELLIPSE_EXPECTED R(0.7)
 
 /* ---- Chosen: guards against rounding: at half and at double one scene changes, by its
  * multiply-accumulates (study constants). Check: ctest --preset host -R evidence */

@@ -1,11 +1,10 @@
 /* Which discs stay: backward elimination by likelihood ratio.
  *
  * The discs as fitted are linearised once; the linearisation tells what F would rise by without
- * each. Where every rise is far above the threshold and no two discs are near each other, nothing
- * else is done. Else the discs are fitted to the data in Sigma's metric, and so are the likeliest
- * of the simpler answers: the weakest disc left out, near pairs as one. The simpler one is taken
- * while F rises by less than the threshold, times what the data fit worse than they should: where
- * the model is wrong by more than it says, more is asked of a touch.
+ * each. Where every rise is far above the threshold, nothing else is done. Else the discs are
+ * fitted to the data in Sigma's metric, and so are those without the weakest. The simpler answer is
+ * taken while F rises by less than the threshold, times what the data fit worse than they should:
+ * where the model is wrong by more than it says, more is asked of a touch.
  *
  * Where no more columns may be made, the linearisation alone decides: what it can do without goes.
  */
@@ -22,19 +21,6 @@ static void add_shapes(const eits_context *ctx, eits_answer *answer, eits_likeli
         answer->parameters = parameters;
         likelihood->at_hand = 0;
     }
-}
-
-/* Discs i < j as one of the same strength. */
-static void merge(const eits_context *ctx, eits_answer *answer, uint32_t i, uint32_t j)
-{
-    const eits_disc a = answer->disc[i], b = answer->disc[j];
-    eits_disc one = eits_merged_disc(&ctx->options, &a, &b);
-    one.change = (a.change * a.radius_mm * a.radius_mm + b.change * b.radius_mm * b.radius_mm) /
-                 (one.radius_mm * one.radius_mm);
-    eits_leave_out(answer, j);
-    answer->disc[i] = one;
-    answer->radius_mm[i] = one.radius_mm;
-    memset(answer->shape[i], 0, sizeof answer->shape[i]);
 }
 
 /* Leave out of `rest`, one after another from the weakest on, whatever the linearisation can do
@@ -55,9 +41,8 @@ static void drop_linearly(eits_context *ctx, const eits_scratch *scratch, const 
         add_shapes(ctx, rest, likelihood);
 }
 
-/* The best of the answers with one disc less: without the weakest, unless that is clear, or with a
- * near pair as one. Where the linearisation alone has judged the discs, they are fitted only if
- * that may decide. */
+/* The answer without the weakest disc, unless that is clear. Where the linearisation alone has
+ * judged the discs, they are fitted only if that may decide. */
 static int take_simpler(eits_context *ctx, const eits_scratch *scratch, eits_verdict *v,
                         uint32_t weakest, eits_likelihood *likelihood, uint64_t *macs)
 {
@@ -69,22 +54,6 @@ static int take_simpler(eits_context *ctx, const eits_scratch *scratch, eits_ver
         *macs += eits_linear_drop(ctx, scratch, &best, likelihood, weakest);
         add_shapes(ctx, &best, likelihood);
         *macs += eits_refit(ctx, scratch, &best, likelihood, enough, R(INFINITY));
-    }
-    for (uint32_t j = 1; j < v->answer.count; ++j) {
-        for (uint32_t i = 0; i < j; ++i) {
-            if (best.misfit < enough || !eits_may_be_one(v, i, j, threshold) ||
-                !eits_may_make(ctx, 2 * eits_columns_of(&best)))
-                continue;
-            eits_answer one = v->answer;
-            merge(ctx, &one, i, j);
-            add_shapes(ctx, &one, likelihood);
-            likelihood->at_hand = 0;
-            *macs += eits_refit(ctx, scratch, &one, likelihood, enough, enough);
-            if (one.misfit < best.misfit)
-                best = one;
-            else
-                likelihood->at_hand = 0;
-        }
     }
     if (!v->fitted && !(best.misfit < enough) && best.misfit < here + threshold) {
         likelihood->at_hand = 0;
@@ -100,20 +69,19 @@ static int take_simpler(eits_context *ctx, const eits_scratch *scratch, eits_ver
     return 1;
 }
 
-int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict *v,
-                   eits_likelihood *first, int to_the_end, uint64_t *macs)
+int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict *v, int to_the_end,
+                   uint64_t *macs)
 {
-    eits_likelihood now = *first;
+    eits_likelihood now = {.at_hand = 0};
     /* of the discs as they came, which would be gone on with another time */
     const uint32_t others = eits_columns_of(&v->answer);
-    if (!now.at_hand && !eits_may_make(ctx, eits_columns_of(&v->answer)))
+    if (to_the_end && !eits_may_make(ctx, eits_columns_of(&v->answer)))
         return 0;
     while (v->answer.count > ctx->reference.far) {
         if (!now.at_hand)
             *macs += eits_linearise(ctx, scratch, &v->answer, &now);
         uint32_t weakest = eits_look(ctx, scratch, v, &now);
-        if (v->rise[weakest] > EITS_CLEAR * eits_needed_rise(ctx, v) &&
-            !eits_any_may_be_one(v, eits_needed_rise(ctx, v)))
+        if (v->rise[weakest] > EITS_CLEAR * eits_needed_rise(ctx, v))
             return 1;
         if (!to_the_end &&
             eits_excess(ctx, v->answer.misfit, v->answer.count) >

@@ -49,11 +49,10 @@ uint32_t eits_shape_parameters(const eits_context *ctx, uint32_t count);
 /* How much of a parameter's column disc k has. */
 eits_real eits_shape_part(const eits_answer *answer, uint32_t k, uint32_t parameter);
 
-/* evidence.column of disc k of the answer, R'^-1 applied, each times the disc's change, but for the
- * first `known`, which are there: none, or EITS_PLACE_PARAMETERS of them; and evidence.left less
- * what the disc answers. */
+/* evidence.column of disc k of the answer, R'^-1 applied, each times the disc's change; and
+ * evidence.left less what the disc answers. */
 uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
-                            const eits_answer *answer, uint32_t k, uint32_t known);
+                            const eits_answer *answer, uint32_t k);
 
 /* left (stride numbers) = what the answer's discs, with their shapes, leave of the data. Uses
  * scratch->row[2] and [3]; what a linearisation made stays. */
@@ -83,8 +82,7 @@ int eits_may_make(eits_context *ctx, uint32_t columns);
 /* The same of what is tried at last: within all that options.test_columns allows. */
 int eits_may_make_later(eits_context *ctx, uint32_t columns);
 
-/* Linearise F about the answer: evidence.column, evidence.left and scratch->square. Where
- * evidence.places_made, the columns of its shapes alone are made. */
+/* Linearise F about the answer: evidence.column, evidence.left and scratch->square. */
 uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
                         eits_likelihood *out);
 
@@ -106,7 +104,7 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
 
 /* touch_test.c */
 
-/* Drop and merge discs of `f` that the model's errors could have made; sets what is known of each
+/* Drop discs of `f` that the model's errors could have made; sets what is known of each
  * that stays. */
 void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
@@ -126,19 +124,6 @@ void eits_pair_line(const eits_answer *answer, const eits_likelihood *likelihood
  * its last. 0 where there is no room for them. */
 int eits_split_disc(const eits_context *ctx, const eits_answer *one, uint32_t k,
                     const eits_real line[2], eits_answer *two);
-
-/* ellipse.c */
-
-/* Half of disc k's long axis over its radius, as a vector, by the shape that the linearisation
- * gives it; 0, 0 where it is a disc as far as the data tell. `excess`: how much worse than Sigma
- * says the data fit. */
-void eits_long_axis(const eits_scratch *scratch, const eits_answer *answer,
-                    const eits_likelihood *likelihood, uint32_t k, eits_real excess,
-                    eits_real axis[2]);
-
-/* Sets f->long_mm and, where there is an axis, f->ellipse_mm of disc k, by f->apart_mm. */
-void eits_place_ellipse(const eits_context *ctx, const eits_disc *disc, const eits_real axis[2],
-                        eits_fit *f, uint32_t k);
 
 /* confidence.c */
 

@@ -120,18 +120,6 @@ int eits_may_make_later(eits_context *ctx, uint32_t columns)
     return may_make(ctx, columns, ctx->options.test_columns);
 }
 
-/* Columns of discs without shapes go where those of discs with shapes are, from the last on: each
- * to a place at or behind its own. */
-static void make_room(eits_context *ctx, const eits_answer *answer)
-{
-    const size_t stride = EITS_STRIDE(ctx->model->rank);
-    for (uint32_t k = answer->count; k-- > 1;) {
-        for (uint32_t p = EITS_PLACE_PARAMETERS; p-- > 0;)
-            eits_copy(ctx->evidence.column + stride * (k * answer->parameters + p),
-                      ctx->evidence.column + stride * (k * EITS_PLACE_PARAMETERS + p), stride);
-    }
-}
-
 uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
                         eits_likelihood *out)
 {
@@ -139,18 +127,12 @@ uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const ei
     const size_t stride = EITS_STRIDE(rank);
     eits_real gradient[EITS_EVIDENCE_COLUMNS];
     uint64_t macs = 0;
-    const int extends = ctx->evidence.places_made && answer->parameters > EITS_PLACE_PARAMETERS;
-    const uint32_t known = extends ? EITS_PLACE_PARAMETERS : 0;
     out->count = n;
     out->at_hand = 1;
-    ctx->evidence.places_made = 0;
-    ctx->evidence.columns_made += n - known * answer->count;
-    ctx->evidence.columns_kept += known * answer->count;
-    if (extends)
-        make_room(ctx, answer);
+    ctx->evidence.columns_made += n;
     eits_copy(ctx->evidence.left, ctx->evidence.data, stride);
     for (uint32_t k = 0; k < answer->count; ++k)
-        macs += eits_shape_columns(ctx, scratch, answer, k, known);
+        macs += eits_shape_columns(ctx, scratch, answer, k);
     out->here =
         eits_dot(ctx->kernels, ctx->evidence.left, ctx->evidence.left, rank) + prior_of(answer);
     for (uint32_t i = 0; i < n; ++i) {

@@ -72,7 +72,7 @@ static uint64_t dipole(eits_context *ctx, const eits_scratch *scratch, const eit
 }
 
 uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
-                            const eits_answer *answer, uint32_t k, uint32_t known)
+                            const eits_answer *answer, uint32_t k)
 {
     const uint32_t rank = ctx->model->rank, parameters = answer->parameters;
     const size_t stride = EITS_STRIDE(rank);
@@ -82,8 +82,7 @@ uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
     for (uint32_t p = 0; p < EITS_SHAPE_PARAMETERS; ++p)
         column[p] = ctx->evidence.column + stride * (k * parameters + (p < parameters ? p : 0));
     eits_real *edge[2] = {column[4], column[5]};
-    uint64_t macs = eits_disc_shape(ctx, scratch, disc, known > 0 ? NULL : column[0],
-                                    known > 0 ? NULL : &column[1],
+    uint64_t macs = eits_disc_shape(ctx, scratch, disc, column[0], &column[1],
                                     parameters > EITS_PLACE_PARAMETERS ? edge : NULL);
     const eits_real unit[EITS_EDGE_PARAMETERS] = {disc->change,
                                                   disc->change * pixel,
@@ -91,7 +90,7 @@ uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
                                                   disc->change * answer->radius_mm[k],
                                                   disc->change * disc->radius_mm,
                                                   disc->change * disc->radius_mm};
-    for (uint32_t p = known; p < parameters && p < EITS_EDGE_PARAMETERS; ++p) {
+    for (uint32_t p = 0; p < parameters && p < EITS_EDGE_PARAMETERS; ++p) {
         for (uint32_t i = 0; i < rank; ++i)
             column[p][i] *= unit[p];
     }
@@ -102,7 +101,7 @@ uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
         macs += dipole(ctx, scratch, disc, im, column[7]);
     }
     for (uint32_t p = 0; p < parameters; ++p) {
-        macs += p < known ? 0 : eits_whiten_errors(ctx, column[p]);
+        macs += eits_whiten_errors(ctx, column[p]);
         eits_axpy(ctx->kernels, ctx->evidence.left, -eits_shape_part(answer, k, p), column[p],
                   rank);
     }

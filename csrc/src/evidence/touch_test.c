@@ -23,36 +23,11 @@ static eits_real evidence(const eits_verdict *v)
            v->log_determinant;
 }
 
-/* Whether the discs need no closer look: as discs, which costs least. Where discs leave something,
- * one look at their shapes then tells whether one may be two. */
-static int is_clear(eits_context *ctx, const eits_scratch *scratch, eits_verdict *v,
-                    eits_likelihood *look, uint64_t *macs)
-{
-    const uint32_t all = v->answer.parameters;
-    v->answer.parameters = EITS_PLACE_PARAMETERS;
-    *macs += eits_linearise(ctx, scratch, &v->answer, look);
-    const uint32_t weakest = eits_look(ctx, scratch, v, look);
-    const int clear = v->rise[weakest] > EITS_CLEAR_AS_DISCS * eits_needed_rise(ctx, v) &&
-                      !eits_any_may_be_one(v, eits_needed_rise(ctx, v)) &&
-                      eits_excess(ctx, v->answer.misfit, v->answer.count) < EITS_FITS_AS_DISCS;
-    v->answer.parameters = all;
-    look->at_hand = all == EITS_PLACE_PARAMETERS;
-    ctx->evidence.places_made = !look->at_hand;
-    if (clear && all > EITS_PLACE_PARAMETERS &&
-        v->answer.misfit > EITS_PAIR_MISFIT * (eits_real)ctx->model->rank &&
-        eits_may_make(ctx, eits_columns_of(&v->answer))) {
-        *macs += eits_linearise(ctx, scratch, &v->answer, look);
-        eits_look_at_shapes(ctx, scratch, look, v);
-    }
-    return clear;
-}
-
 /* The covariance, and the data in its metric; 0 where there is none. */
 static int take_errors(eits_context *ctx, const eits_scratch *scratch, const eits_fit *f,
                        eits_verdict *v, int drift, uint64_t *macs)
 {
     v->drift = drift;
-    ctx->evidence.places_made = 0;
     if (!eits_factor_covariance(ctx, scratch, drift, &v->log_determinant, macs))
         return 0;
     eits_copy(ctx->evidence.data, f->data, EITS_STRIDE(ctx->model->rank));
@@ -133,8 +108,6 @@ static void split(eits_context *ctx, const eits_scratch *scratch, const eits_fit
                    most = all == 0 || all > EITS_SPLIT_COLUMNS ? EITS_SPLIT_COLUMNS : all;
     (void)take_errors(ctx, scratch, f, v, v->drift, macs); /* as before */
     ctx->evidence.columns_most = most;
-    /* what was saved is not for splits: long touches would be tried as two that are one */
-    ctx->evidence.columns_made += ctx->evidence.columns_kept;
     while (k < v->answer.count && take_split(ctx, scratch, v, k, macs))
         k = likeliest_pair(ctx, v);
 }
@@ -156,20 +129,20 @@ static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, ei
     uint64_t *macs = &f->macs;
     if (v->answer.parameters == 0 || !take_errors(ctx, scratch, f, v, 0, macs))
         return 0;
-    eits_likelihood now, none = {.at_hand = 0};
-    if (is_clear(ctx, scratch, v, &now, macs))
-        return 1;
-    int whole = eits_eliminate(ctx, scratch, v, &now, 0, macs);
+    if (!eits_may_make(ctx, eits_columns_of(&v->answer))) /* one look is always made */
+        v->answer.parameters = EITS_PLACE_PARAMETERS;
+    ctx->evidence.spent = 0;
+    int whole = eits_eliminate(ctx, scratch, v, 0, macs);
     if (!whole)
         ctx->evidence.columns_most = ctx->options.test_columns;
     if (eits_fits(ctx, v) || !eits_may_make(ctx, eits_columns_of(&drifted.answer)))
         return 1;
     const int drifts = take_errors(ctx, scratch, f, &drifted, 1, macs);
     if (drifts)
-        (void)eits_eliminate(ctx, scratch, &drifted, &none, 1, macs);
+        (void)eits_eliminate(ctx, scratch, &drifted, 1, macs);
     if (!whole && (!drifts || evidence(&drifted) >= v->answer.misfit + v->log_determinant))
-        whole = take_errors(ctx, scratch, f, v, 0, macs) &&
-                eits_eliminate(ctx, scratch, v, &none, 1, macs);
+        whole =
+            take_errors(ctx, scratch, f, v, 0, macs) && eits_eliminate(ctx, scratch, v, 1, macs);
     if (drifts && (!whole || evidence(&drifted) < evidence(v)))
         *v = drifted;
     return 1;
@@ -177,7 +150,7 @@ static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, ei
 
 void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
-    ctx->evidence.columns_made = ctx->evidence.columns_kept = ctx->evidence.spent = 0;
+    ctx->evidence.columns_made = ctx->evidence.spent = 0;
     ctx->evidence.columns_most = columns_without_drift(ctx, f);
     if (f->count == 0)
         return;
@@ -202,7 +175,6 @@ void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit 
         f->apart_mm[k][0] = v.best_mm[k][0] - reported->x_mm;
         f->apart_mm[k][1] = v.best_mm[k][1] - reported->y_mm;
         f->pair[k] = v.pair[k];
-        eits_place_ellipse(ctx, reported, v.axis[k], f, k);
     }
     if (!v.changed)
         return;

@@ -14,33 +14,6 @@ eits_real eits_excess(const eits_context *ctx, eits_real misfit, uint32_t count)
     return of > 1 ? of : 1;
 }
 
-/* Two clear discs are two, however near; a weak one may be what the other's shape leaves over. Two
- * that lie along one long touch are further apart, and each is worth much; to try all such pairs of
- * a crowd would cost too much. A conducting and an insulating touch are never one. */
-int eits_may_be_one(const eits_verdict *v, uint32_t i, uint32_t j, eits_real needed)
-{
-    const int few = v->answer.count <= EITS_FEW_DISCS;
-    const eits_disc *a = &v->answer.disc[i], *b = &v->answer.disc[j];
-    const eits_real weaker = v->rise[i] < v->rise[j] ? v->rise[i] : v->rise[j],
-                    clear = few ? EITS_CLEAR_OF_FEW : EITS_CLEAR_OF_MANY, dx = a->x_mm - b->x_mm,
-                    dy = a->y_mm - b->y_mm,
-                    reach = (few ? EITS_REACH_OF_FEW : EITS_MERGE_REACH) *
-                            (a->radius_mm + b->radius_mm);
-    return a->polarity == b->polarity && weaker < clear * needed &&
-           eits_fma(dx, dx, dy * dy) < reach * reach;
-}
-
-int eits_any_may_be_one(const eits_verdict *v, eits_real needed)
-{
-    for (uint32_t j = 1; j < v->answer.count; ++j) {
-        for (uint32_t i = 0; i < j; ++i) {
-            if (eits_may_be_one(v, i, j, needed))
-                return 1;
-        }
-    }
-    return 0;
-}
-
 uint32_t eits_weakest(const eits_scratch *scratch, const eits_answer *answer,
                       const eits_likelihood *likelihood, eits_real *rise)
 {
@@ -71,29 +44,17 @@ static void place_of(const eits_context *ctx, const eits_scratch *scratch,
     v->best_mm[k][1] = eits_fma(pixel, likelihood->step[k * p + 2], v->answer.disc[k].y_mm);
 }
 
-/* What is an ellipse has its place by the look that says so. */
-void eits_look_at_shapes(const eits_context *ctx, const eits_scratch *scratch,
-                         const eits_likelihood *likelihood, eits_verdict *v)
-{
-    const eits_real unit = eits_excess(ctx, v->answer.misfit, v->answer.count);
-    for (uint32_t k = 0; k < v->answer.count; ++k) {
-        v->pair[k] = eits_pair_score(scratch, &v->answer, likelihood, k);
-        eits_pair_line(&v->answer, likelihood, k, v->line[k]);
-        eits_long_axis(scratch, &v->answer, likelihood, k, unit, v->axis[k]);
-        if (v->axis[k][0] != 0 || v->axis[k][1] != 0)
-            place_of(ctx, scratch, likelihood, v, k);
-    }
-}
-
 uint32_t eits_look(const eits_context *ctx, const eits_scratch *scratch, eits_verdict *v,
                    const eits_likelihood *likelihood)
 {
     if (!v->fitted)
         v->answer.misfit = likelihood->least;
     v->here = likelihood->here;
-    for (uint32_t k = 0; k < v->answer.count; ++k)
+    for (uint32_t k = 0; k < v->answer.count; ++k) {
         place_of(ctx, scratch, likelihood, v, k);
-    eits_look_at_shapes(ctx, scratch, likelihood, v);
+        v->pair[k] = eits_pair_score(scratch, &v->answer, likelihood, k);
+        eits_pair_line(&v->answer, likelihood, k, v->line[k]);
+    }
     return eits_weakest(scratch, &v->answer, likelihood, v->rise);
 }
 

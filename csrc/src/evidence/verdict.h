@@ -14,9 +14,8 @@ typedef struct verdict {
     eits_real best_mm[EITS_MAX_TOUCHES][2]; /* where the linearisation has the disc */
     eits_real pair[EITS_MAX_TOUCHES];       /* log odds that it is two (pair.c) */
     eits_real line[EITS_MAX_TOUCHES][2];    /* on which two in its place would lie */
-    eits_real axis[EITS_MAX_TOUCHES][2];    /* half of its long axis over its radius */
     int drift;                              /* 1: of a sheet that has drifted */
-    int changed;                            /* 1: discs were dropped, merged or split */
+    int changed;                            /* 1: discs were dropped or split */
     int fitted;                             /* 1: in Sigma's metric */
 } eits_verdict;
 
@@ -40,25 +39,16 @@ int eits_fits(const eits_context *ctx, const eits_verdict *v);
 uint32_t eits_look(const eits_context *ctx, const eits_scratch *scratch, eits_verdict *v,
                    const eits_likelihood *likelihood);
 
-/* Of that, what its shape says. */
-void eits_look_at_shapes(const eits_context *ctx, const eits_scratch *scratch,
-                         const eits_likelihood *likelihood, eits_verdict *v);
-
 /* Rises of the answer's discs; returns the weakest. */
 uint32_t eits_weakest(const eits_scratch *scratch, const eits_answer *answer,
                       const eits_likelihood *likelihood, eits_real *rise);
-
-/* Whether near discs i and j may be one touch: where one of them is worth little beside the other.
- */
-int eits_may_be_one(const eits_verdict *v, uint32_t i, uint32_t j, eits_real needed);
-int eits_any_may_be_one(const eits_verdict *v, eits_real needed);
 
 /* elimination.c */
 
 /* From the discs as they are to those that stay, under the present covariance; not `to_the_end`: 0
  * as soon as the data are found not to fit, to be gone on with another time, and where no column
  * may be made at all. Where no more may be made, what stands then stays. */
-int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict *v,
-                   eits_likelihood *first, int to_the_end, uint64_t *macs);
+int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict *v, int to_the_end,
+                   uint64_t *macs);
 
 #endif

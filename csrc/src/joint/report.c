@@ -98,9 +98,6 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
         long_axis(s, pixel, f->long_mm[k]);
         if (!(known[k].shape > EITS_JOINT_LONG * excess)) /* a disc, as far as the data tell */
             eits_zero(f->long_mm[k], 2);
-        f->ellipse_mm[k][0] = d->x_mm;
-        f->ellipse_mm[k][1] = d->y_mm;
-        f->ellipse_mm[k][2] = d->radius_mm;
         report_spread(ctx, s, &known[k], excess, f->place_mm2[k], &f->radius_sd_mm[k]);
     }
 }

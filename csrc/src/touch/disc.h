@@ -9,7 +9,6 @@ typedef struct eits_disc {
     eits_real x_mm, y_mm, radius_mm;
     eits_real change;   /* S/m, uniform within the disc */
     eits_real polarity; /* +1 or -1: the sign that `change` must keep */
-    uint32_t whole;     /* 1: two were fitted in its place, and were no better */
 } eits_disc;
 
 /* A pixel is covered by clamp(1/2 + (radius - distance) / pixel): exact for a straight edge that

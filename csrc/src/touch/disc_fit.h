@@ -32,10 +32,8 @@ typedef struct eits_fit {
     eits_real apart_mm[EITS_MAX_TOUCHES][2];
     /* logarithm of the odds that the disc is two touches (evidence/pair.c) */
     eits_real pair[EITS_MAX_TOUCHES];
-    /* half of its long axis, as a vector; 0, 0: as far as the data tell a disc */
+    /* of the joint fit: half of the long axis, as a vector; 0, 0: as far as the data tell a disc */
     eits_real long_mm[EITS_MAX_TOUCHES][2];
-    /* the x, y and radius of what has one (evidence/ellipse.c) */
-    eits_real ellipse_mm[EITS_MAX_TOUCHES][3];
     /* of the joint fit: standard deviation of the radius; 0: the data do not tell the radius */
     eits_real radius_sd_mm[EITS_MAX_TOUCHES];
     /* probability that the disc is one touch (evidence/confidence.c) */
@@ -102,9 +100,6 @@ void eits_fit_explain(eits_context *ctx, eits_fit *f);
 void eits_fit_prune(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
 /* split_merge.c: neither tries any more once the fit has made EITS_FIT_MOVES */
-
-/* One disc in the place of two, of their area. Its strength is not set. */
-eits_disc eits_merged_disc(const eits_options *o, const eits_disc *a, const eits_disc *b);
 
 /* Overlapping or nearly touching discs become one where that explains as much. Returns 1 where any
  * did. */

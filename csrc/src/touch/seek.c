@@ -194,5 +194,4 @@ void eits_fit_centre(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
     }
     for (int i = 0; i < 3; ++i)
         f->place_mm2[0][i] = EITS_CENTRE_SPREAD * pixel * pixel * second[i];
-    eits_zero(f->long_mm[0], 2);
 }

@@ -70,7 +70,7 @@ static int next_pair(const eits_fit *f, const pair *last, pair *next)
 }
 
 /* One disc in the middle of both, weighted by strength, of their area. */
-eits_disc eits_merged_disc(const eits_options *o, const eits_disc *a, const eits_disc *b)
+static eits_disc merged_disc(const eits_options *o, const eits_disc *a, const eits_disc *b)
 {
     const eits_real of_a = eits_fabs(a->change) * a->radius_mm * a->radius_mm,
                     of_b = eits_fabs(b->change) * b->radius_mm * b->radius_mm;
@@ -93,7 +93,7 @@ static int try_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
 {
     const uint32_t rank = ctx->model->rank;
     const eits_fit_kept before = eits_fit_keep(ctx, f);
-    f->disc[p->i] = eits_merged_disc(&ctx->options, &f->disc[p->i], &f->disc[p->j]);
+    f->disc[p->i] = merged_disc(&ctx->options, &f->disc[p->i], &f->disc[p->j]);
     --f->count;
     for (uint32_t k = p->j; k < f->count; ++k)
         f->disc[k] = f->disc[k + 1u];
@@ -239,10 +239,8 @@ static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
 {
     const uint32_t last = f->count;
     const eits_fit_kept before = eits_fit_keep(ctx, f);
-    const eits_real first =
-        before.count < EITS_SPLIT_CROWD ? EITS_SPLIT_FIRST : EITS_SPLIT_FIRST_OF_CROWD;
     const two begin = best_two(ctx, scratch, f, k);
-    if (begin.left < 0 || begin.left > first * before.left)
+    if (begin.left < 0 || begin.left > EITS_SPLIT_FIRST * before.left)
         return 0;
     f->disc[k] = begin.disc[0];
     f->disc[last] = begin.disc[1];
@@ -259,7 +257,6 @@ static int try_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
         edge_distance(&f->disc[k], &f->disc[last]) > EITS_SPLIT_DISTANCE)
         return 1;
     eits_fit_undo(ctx, scratch, f, &before);
-    f->disc[k].whole = 1;
     return 0;
 }
 
@@ -281,8 +278,7 @@ int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
                 k = i;
         }
         looked[k] = 1;
-        if (!f->disc[k].whole)
-            any |= try_split(ctx, scratch, f, k);
+        any |= try_split(ctx, scratch, f, k);
     }
     return any;
 }

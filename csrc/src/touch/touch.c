@@ -175,11 +175,10 @@ void eits_fit_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *
     /* Peaks and strengths only, as asked. */
     if (ctx->options.touch_sweeps == 0)
         return;
+    /* Merging comes first: two halves of one touch are no two dipoles in each other's field. */
     if (splits_merges)
         (void)eits_fit_merge(ctx, scratch, f);
-    /* Merging comes first: two halves of one touch are no two dipoles in each other's field. */
-    /* Places and interaction depend on each other: in turn. */
-    for (int round = 0; interacts && f->count > 1 && round < EITS_ROUNDS; ++round) {
+    if (interacts && f->count > 1) {
         remove_interaction(ctx, scratch, f);
         eits_fit_move_all(ctx, scratch, f, later(ctx));
     }
@@ -216,12 +215,10 @@ uint32_t eits_report_touches(const eits_context *ctx, const eits_fit *f, eits_to
     uint32_t count = 0;
     for (uint32_t k = 0; k < f->count; ++k) {
         const eits_disc *disc = &f->disc[k];
-        const int is_long = f->tested && (f->long_mm[k][0] != 0 || f->long_mm[k][1] != 0);
-        const eits_real *ellipse = f->ellipse_mm[k];
         const eits_touch touch = {
-            .x_mm = is_long ? ellipse[0] : disc->x_mm,
-            .y_mm = is_long ? ellipse[1] : disc->y_mm,
-            .radius_mm = is_long ? ellipse[2] : disc->radius_mm,
+            .x_mm = disc->x_mm,
+            .y_mm = disc->y_mm,
+            .radius_mm = disc->radius_mm,
             .strength_s_per_m_mm2 = disc->change * area_of(ctx, f, disc),
             .explained = f->explained[k] < 1 ? f->explained[k] : 1,
             .confidence = f->tested ? f->confidence[k] : 0,

@@ -128,9 +128,7 @@ def test_both_widths_find_the_same_touches_in_other_worlds(name):
         assert (count == 0) == (name in UNTOUCHED)
 
 
-@pytest.mark.parametrize(
-    ("name", "k"), [("fingers", 1), ("fingers", 12), ("ellipses", 15), ("ellipses", 20)]
-)
+@pytest.mark.parametrize(("name", "k"), [("fingers", 1), ("ellipses", 15), ("ellipses", 20)])
 def test_a_long_touch_has_no_other_beyond_it(name, k):
     """Without its shape a further disc at the rim would be clear; where the columns do not suffice
     to see that (fingers 1, ellipses 20), the linearisation does."""
