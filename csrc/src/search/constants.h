@@ -68,10 +68,10 @@
 
 /* that a drive with a search may spend [answers of a place in a drive]. larger: drives take longer;
  * smaller: searches do */
-#define EITS_FAST_ANSWERS 30
+#define EITS_FAST_ANSWERS 32
 
 /* fewer for each known touch, which take their own work [answers]. as FAST_ANSWERS */
-#define EITS_FAST_TOUCH_ANSWERS 6
+#define EITS_FAST_TOUCH_ANSWERS 5
 
 /* what the map of a drive costs [answers]. larger: fewer pieces of a search in a drive */
 #define EITS_FAST_MAP_ANSWERS 4
