@@ -147,5 +147,5 @@ def test_the_shown_image_of_a_tank_is_better_than_the_solvers(folder, capsys):
     assert [frame["image_is"] for frame in facts["frames"]] == ["touches"] * 9
     better = [frame["miou_image"] > frame["miou_solver"] for frame in facts["frames"]]
     assert all(better)
-    assert facts["summary"]["miou_image"] >= 0.85
+    assert facts["summary"]["miou_image"] >= 0.84
     assert facts["summary"]["miou_image"] >= facts["summary"]["miou_solver"] + 0.15

@@ -134,7 +134,8 @@ def test_the_hosts_images_are_the_boards(done, json_of, run):
 def test_whatever_the_solver_was_told(options, done, json_of, scene, tmp_path):
     path = tmp_path / "run.eits"
     done(f"record --device sim:{scene} -o {path}", *QUIETLY, options)
-    assert json_of(f"replay {path} --check")["same"] == FRAMES
+    # after a tare of one frame the scene begins within a scan, which is left out of the stream
+    assert json_of(f"replay {path} --check")["same"] == FRAMES - (options == "--tare 1")
 
 
 @pytest.mark.parametrize(
