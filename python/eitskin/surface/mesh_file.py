@@ -107,7 +107,7 @@ def _loaded(path: Path) -> tuple[FloatArray, IntArray]:
         why = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise FileError(f"{path}: cannot be read as a mesh ({why}); export it again") from None
     if points.ndim != 2 or triangles.ndim != 2 or not len(triangles):
-        raise FileError(f"{path}: holds no triangles; export the surface as triangles")
+        raise FileError(f"{path}: holds no whole triangles; export the surface as triangles again")
     return points, triangles
 
 
