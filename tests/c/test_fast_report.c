@@ -114,8 +114,8 @@ TEST(a_followed_touch_is_what_was_found_near_it)
     CHECK_EQUAL(report(NULL, 0), 0); /* the report of a frame is made once */
 }
 
-/* What drives follow lags behind a finger in noise. A wide contact is several touches to the
- * solver: it stays where drives have it. */
+/* In noise, drives lag behind a finger, so the frame's place is shown. The solver takes a wide
+ * contact for several touches, so that one stays where drives have it. */
 TEST(where_the_two_differ_the_frame_is_shown)
 {
     const eits_fast_touch finger = {.id = 3, .strength_s_per_m_mm2 = 1, .radius_mm = 7};

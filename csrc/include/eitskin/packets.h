@@ -750,7 +750,7 @@ typedef struct eits_command_settings {
     /* limit of the current: at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1:
      * unchanged */
     uint32_t current_limit_ua_rms;
-    /* the board's name: letters, digits, - and _, of which the first is a letter or digit;
+    /* the board's name. It has letters, digits, - and _, and begins with a letter or digit;
      * zero-filled; empty: none */
     char name[32];
     /* amplitude of the current source as fitted, 10 to 7,000; 0: as designed; 2^32 - 1:

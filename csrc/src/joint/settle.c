@@ -22,8 +22,8 @@ static void try_ellipses(eits_context *ctx, eits_joint *j, uint64_t *macs)
     eits_joint_back(ctx, j);
 }
 
-/* Whether touches may be missing or too many: in a crowd. On a sheet that
- * has drifted the image shows many light touches, which leave much; there nothing is sought. */
+/* Whether touches are sought: in a crowd some may be missing, or too many. On a sheet that has
+ * drifted the image shows many light touches, which leave much; there nothing is sought. */
 static int may_miss(const eits_context *ctx, const eits_joint *j)
 {
     uint32_t strong = 0;

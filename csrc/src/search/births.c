@@ -9,8 +9,8 @@ static int one_is_not_enough(const eits_fast *fast)
            !eits_search_changed(fast, FAST_REPLACE);
 }
 
-/* Decisions take turns in what they look for beside one new touch: two of them, or anything else.
- * What the last search would have acted on is looked for again. */
+/* Beside one new touch, searches look by turns for two new ones and for anything else. A search
+ * looks again for what the last one would have acted on. */
 static int odd(const eits_fast *fast)
 {
     const fast_search *s = &fast->search;

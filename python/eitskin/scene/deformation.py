@@ -21,7 +21,7 @@ from eitskin.surface.surface_map import SurfaceMap
 
 
 class Deformation(ABC):
-    """What happens to the lengths of a skin. Frames with equal deformations share a solve, so
+    """A change of the lengths of a skin. Frames with equal deformations share a solve; therefore
     deformations can be compared and hashed."""
 
     @abstractmethod

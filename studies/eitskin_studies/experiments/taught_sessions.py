@@ -10,15 +10,14 @@ import numpy as np
 from eitskin.arrays import FloatArray
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Reconstruction
-from eitskin.errors import UsageError
 from eitskin.model.model import Model
 from eitskin.model.options import default_options, tracking
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin.teaching.left_out import CHI2_90
-from eitskin.teaching.presses import Presses, load_presses
+from eitskin.teaching.presses import Presses
 from eitskin.teaching.teach import squared, teach
 from eitskin_studies.experiments.experiment import ExperimentOutcome, Table, Workspace
-from eitskin_studies.experiments.teaching import FILE, SKIN
+from eitskin_studies.experiments.teaching import SKIN, load_measured
 
 TITLE = "Streams of a taught skin"
 COUNTS = (100, 400)  # presses that teach
@@ -42,8 +41,8 @@ class Scan:
 
 @dataclass
 class Seen:
-    """What was reported of one press: ids in the order of frames, the delay to the first report in
-    s, whether reports had a gap, the last distance in mm and its squared error in the covariance,
+    """The reports of one press: ids in the order of frames, the delay to the first report in s,
+    whether reports had a gap, the last distance in mm and its squared error in the covariance,
     the delay to its first confirmed report in s, and the numbers of frames, of those with a false
     touch, and of those with a false confirmed touch."""
 
@@ -163,13 +162,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     Raises:
         UsageError: the presses are not there.
     """
-    folder = workspace.settings.data
-    if folder is None or not (folder / FILE).is_file():
-        raise UsageError(
-            f"study taught-sessions: needs --data DIR with {FILE}, presses that are not part of the"
-            " project; studies/results/teaching.md says which"
-        )
-    presses = load_presses(folder / FILE)
+    presses = load_measured(workspace, "taught-sessions")
     found: dict[str, dict[str, float]] = {}
     for count in workspace.progress(COUNTS, "presses"):
         taught = _Taught(presses, count)

@@ -51,7 +51,7 @@ def run(folder: Path, command: list[str], setting: dict[str, str]) -> subprocess
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory) -> Callable[[int], tuple[bytes, bytes]]:
-    """What a command of COMMANDS prints and draws without such settings."""
+    """The output and the picture of a command of COMMANDS without such settings."""
 
     @cache
     def of(number: int) -> tuple[bytes, bytes]:

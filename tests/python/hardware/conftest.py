@@ -11,7 +11,7 @@ from eitskin_hardware.circuit.instrument import _quiet_skidl
 
 
 class Called(NamedTuple):
-    """What SKiDL reads of a frame of ``inspect.stack()``."""
+    """The three fields that SKiDL reads of a frame of ``inspect.stack()``."""
 
     frame: FrameType
     filename: str

@@ -65,7 +65,7 @@ def errors() -> ModelErrors:
 
 @cache
 def joint_errors() -> ModelErrors:
-    """Those of a model that fits all touches at once."""
+    """The errors of a model that fits all touches at once."""
     return draw_model_errors(replace(request(), fits_jointly=True), jobs=1)
 
 

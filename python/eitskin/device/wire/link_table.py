@@ -571,7 +571,7 @@ class Settings(Command, c="eits_command_settings", kind=PacketType.SETTINGS):
     settings: U32  # bits of eits_setting
     # limit of the current: at most 10,000; 0: 1.25 times what the source gives; 2^32 - 1: unchanged
     current_limit_ua_rms: U32
-    # the board's name: letters, digits, - and _, of which the first is a letter or digit;
+    # the board's name. It has letters, digits, - and _, and begins with a letter or digit;
     # zero-filled; empty: none
     name: Text32
     # amplitude of the current source as fitted, 10 to 7,000; 0: as designed; 2^32 - 1: unchanged

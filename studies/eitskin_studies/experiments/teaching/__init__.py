@@ -53,8 +53,8 @@ TARGETS = {
 }  # fmt: skip
 
 
-def run(workspace: Workspace) -> ExperimentOutcome:
-    """Every split by every method.
+def load_measured(workspace: Workspace, study: str) -> Presses:
+    """Load the measured presses from the folder that ``study`` was given.
 
     Raises:
         UsageError: the presses are not there.
@@ -62,10 +62,19 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     folder = workspace.settings.data
     if folder is None or not (folder / FILE).is_file():
         raise UsageError(
-            f"study teaching: needs --data DIR with {FILE}, presses that are not part of the"
+            f"study {study}: needs --data DIR with {FILE}, presses that are not part of the"
             " project; studies/results/teaching.md says which"
         )
-    presses = load_presses(folder / FILE)
+    return load_presses(folder / FILE)
+
+
+def run(workspace: Workspace) -> ExperimentOutcome:
+    """Every split by every method.
+
+    Raises:
+        UsageError: the presses are not there.
+    """
+    presses = load_measured(workspace, "teaching")
     splits = workspace.settings.count(SPLITS, 1)
     jobs = [(count, seed) for count in COUNTS for seed in range(splits)]
     taught = {
