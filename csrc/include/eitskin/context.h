@@ -2,7 +2,8 @@
  *
  * A whole program, without its error handling (each call returns an eits_status):
  *
- *     static _Alignas(16) uint8_t workspace[140 * 1024]; // or eits_workspace_size(&model, 0) bytes
+ *     // large enough for the shipped model; other models: eits_workspace_size(&model, 0) bytes
+ *     static _Alignas(16) uint8_t workspace[272 * 1024];
  *     eits_model model;                                  // a view of the blob, which stays
  *     eits_context *ctx;                                 // points into the workspace
  *     eits_touch touches[EITS_MAX_TOUCHES];

@@ -18,13 +18,13 @@
  *     link.h         the packets between a board and a host
  *     types.h        scalar, status, version
  *
- * What holds everywhere. The caller owns all memory; nothing is allocated, printed or kept in a
+ * Rules for all functions: the caller owns all memory; nothing is allocated, printed or kept in a
  * global. Lengths are in mm, voltages in V, conductivity in S/m; names carry the unit. Sums have
  * one order, so that every build gives the same bits, as long as it is compiled without contraction
  * (-ffp-contract=off) and without -ffast-math. A function that fails returns an eits_status below 0
- * and leaves its outputs as they were, or cleared where it says so: never NaN.
+ * and leaves its outputs as they were, or clears them if its comment says so. It never writes NaN.
  *
- * A frame to touches, errors left out (examples/c/minimal.c has them):
+ * From a frame to touches, without the checks for errors (examples/c/minimal.c has them):
  *
  *     eits_model model;
  *     eits_model_open(&model, blob, blob_size);

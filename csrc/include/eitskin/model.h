@@ -32,10 +32,10 @@ extern "C" {
 #define EITS_MAX_RANK             1024
 #define EITS_MAX_PLACE_ROWS       32
 #define EITS_MAX_MOVE_DEGREE      4
-#define EITS_MAX_MOVE_TERMS       15 /* of that degree and below */
+#define EITS_MAX_MOVE_TERMS       15 /* terms of that degree and below */
 #define EITS_MAX_PIXELS           65535
 #define EITS_MAX_ROWS             65535
-#define EITS_MAX_MODEL_ITERATIONS 100000 /* of a model's own defaults; options may ask for more */
+#define EITS_MAX_MODEL_ITERATIONS 100000 /* of a model's defaults; options may ask for more */
 
 /* How the reduced Jacobian is stored. Integer types carry one scale per column. */
 typedef enum eits_storage {
@@ -45,7 +45,7 @@ typedef enum eits_storage {
     EITS_STORAGE_I8 = 3
 } eits_storage;
 
-/* What the solver's data are, from a frame v and the reference frame v0. */
+/* How the solver's data are computed from a frame v and the reference frame v0. */
 typedef enum eits_data_kind {
     EITS_DATA_DIFFERENCE = 0, /* v - v0, in volts of the model */
     EITS_DATA_NORMALISED = 1, /* (v - v0) / v0: for rows that have gains of their own */
@@ -177,7 +177,8 @@ typedef struct eits_uncertainty {
     /* P E P', where E is the second moment of (d_true - d_model) / |d_model| over touched skins,
      * and d the folded data. NULL: the errors are not known, and touches are not tested */
     const float *errors;
-    const float *drift; /* P D P', where D is that of a sheet that drifts untouched; V^2 */
+    const float *drift; /* P D P', where D is the second moment of the data of an untouched skin
+                           that drifts; V^2 */
     uint32_t
         row_gains; /* 1: the errors are those of data multiplied by row gains from the reference */
     float errors_rms; /* rms of |d_true - d_model| / |d_model| over skins that differ */
@@ -198,8 +199,8 @@ typedef struct eits_uncertainty {
     uint32_t move_terms;           /* 1, 3, 6, 10 or EITS_MAX_MOVE_TERMS; 0: none */
 } eits_uncertainty;
 
-/* What the joint fit of touches, which works on folded rows, knows of skins that differ from the
- * model (section ROWE). */
+/* The model errors on folded rows, for the joint fit of touches, which works on these rows (section
+ * ROWE). */
 typedef struct eits_row_errors {
     /* e_1 ... e_count, n_folded x count, fold by fold: where y = log(v0 / v_ref) has the rms
      * `distance`, the second moment of (d_true - d_model) / |d_model| is the sum of e e'. NULL: not
@@ -260,10 +261,11 @@ typedef struct eits_model {
     uint32_t meta_size;
 } eits_model;
 
-/* Check all of `blob` and fill `model` with pointers into it. `blob` must start at a multiple of
- * EITS_MODEL_ALIGNMENT bytes. `size` may be larger than the model, as a flash bank is. Errors:
- * EITS_E_ARGUMENT, EITS_E_MODEL_*; `model` is then unchanged. EITS_E_MODEL_VALUE also if the model
- * names a solver that this library does not have (options.h). */
+/* Check all of `blob`, which has `size` bytes, and fill `model` with pointers into it. `blob` must
+ * start at a multiple of EITS_MODEL_ALIGNMENT bytes. `size` may be larger than the model, as the
+ * size of a flash bank is. Errors: EITS_E_ARGUMENT, EITS_E_MODEL_*; `model` is then unchanged.
+ * EITS_E_MODEL_VALUE also if the model names a solver that this library does not have (options.h).
+ */
 eits_status eits_model_open(eits_model *model, const void *blob, size_t size);
 
 /* The hash that identifies a protocol. The firmware compares the model's with that of the table

@@ -1,9 +1,10 @@
-/* eitskin: how much memory a context needs, and what it is made of.
+/* eitskin: how much memory a context needs, and which arrays it consists of.
  *
  * A workspace holds a context and its arrays. The arrays are listed once, below: eits_init lays
  * them out by that list, and EITS_WORKSPACE_SIZE adds them up by it, so the two cannot disagree.
- * The size is a constant expression where its arguments are, so that a program without a heap can
- * declare the workspace as a static array. Everything else calls eits_workspace_size (context.h).
+ * The size is a constant expression if its arguments are constant, so that a program without a heap
+ * can declare the workspace as a static array. All other programs call eits_workspace_size
+ * (context.h).
  */
 #ifndef EITSKIN_SIZES_H
 #define EITSKIN_SIZES_H
@@ -22,13 +23,14 @@ extern "C" {
 #define EITS_ALIGN16(bytes) (((size_t)(bytes) + 15u) & ~(size_t)15u)
 #define EITS_REALS(count)   EITS_ALIGN16((size_t)(count) * sizeof(eits_real))
 
-/* Bytes of a line of the processor's cache: panels start at a multiple, so that no vector of theirs
- * lies across two lines. */
+/* Bytes of a line of the processor's cache. Panels start at a multiple of it, so that none of their
+ * vectors lies across two lines. */
 #define EITS_LINE 64u
 
-/* ---- How many ---- */
+/* ---- Counts ---- */
 
-/* rank, rounded up to the eight lanes in which sums are made (csrc/src/base/vec.h). */
+/* rank, rounded up to a multiple of the eight lanes in which sums are made (csrc/src/base/vec.h).
+ */
 #define EITS_STRIDE(rank) (((size_t)(rank) + 7u) & ~(size_t)7u)
 
 /* Numbers of an upper triangle of rank x rank whose rows begin at multiples of eight columns. */
@@ -37,17 +39,18 @@ extern "C" {
 /* Entries of a list that holds either pixels or folded rows. */
 #define EITS_LIST(n_pixels, n_folded) ((size_t)((n_pixels) > (n_folded) ? (n_pixels) : (n_folded)))
 
-/* Columns of S that are kept unpacked as floats: more than a working set or a disc has. */
+/* The maximum number of columns of S that are kept unpacked as floats. A working set or a disc has
+ * fewer. */
 #define EITS_MAX_CACHED 256u
 #define EITS_CACHED(n_pixels) \
     ((size_t)((n_pixels) < EITS_MAX_CACHED ? (n_pixels) : EITS_MAX_CACHED))
 
-/* Columns that the touch test has room for: eight parameters each of eight touches, or four each of
- * sixteen. */
+/* The maximum number of columns in the touch test: eight touches with eight parameters each, or
+ * sixteen touches with four each. */
 #define EITS_EVIDENCE_COLUMNS 64u
 
-/* Parameters of all touches that the joint fit has room for: twelve discs or eight ellipses; and
- * folds whose columns it holds at a time. */
+/* The maximum number of parameters of all touches in the joint fit (twelve discs or eight
+ * ellipses), and the number of folds whose columns it keeps at a time. */
 #define EITS_JOINT_PARAMETERS 48u
 #define EITS_JOINT_BLOCK      112u
 
@@ -67,7 +70,7 @@ extern "C" {
 #define EITS_POLE_FIELD(n_electrodes)  (2u * EITS_POLE_TERMS * (size_t)(n_electrodes))
 #define EITS_POLE_SOURCE(n_electrodes) (2u * EITS_POLE_SENT * (size_t)(n_electrodes))
 
-/* What the joint fit needs, where the model has fields. */
+/* The count of an array that only the joint fit needs: 0 for a model without fields. */
 #define EITS_JOINT_IF(n_electrodes, count) ((n_electrodes) > 0 ? (count) : 0u)
 
 /* Columns of a panel: S in panels has that many columns side by side, row after row, so that a
@@ -83,7 +86,7 @@ extern "C" {
  * n_cells is nx * ny; n_electrodes is 0 for a model without fields. */
 /* clang-format off */
 #define EITS_WORKSPACE_ARRAYS(ARRAY, n_rows, n_folded, rank, n_pixels, n_cells, n_electrodes)      \
-    /* from a cell of the image to its pixel */                                                    \
+    /* for each cell of the image, its pixel */                                                    \
     ARRAY(cell, uint16_t, n_cells)                                                                 \
     /* scratch: vectors that solvers, fit and test borrow from each other in turn */               \
     ARRAY(scratch.value, eits_real, EITS_LIST(n_pixels, n_folded))                                 \
@@ -158,32 +161,34 @@ extern "C" {
     ARRAY(columns.column, uint16_t, EITS_CACHED(n_pixels))                                         \
     ARRAY(columns.wanted, uint8_t, EITS_CACHED(n_pixels))
 
-/* Those of a prepared context in addition: S, and the working set's columns, in panels. */
+/* The additional arrays of a prepared context: S, and the columns of the working set, in panels. */
 #define EITS_PREPARED_ARRAYS(ARRAY, rank, n_pixels)                                                \
     ARRAY(columns.panels, eits_real, EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank))                \
     ARRAY(solver.working_panels, eits_real, EITS_PANEL_COLUMNS(n_pixels) * (size_t)(rank))
 /* clang-format on */
 
-/* What the lists are given as ARRAY, to add up bytes and pointers. */
+/* Arguments for ARRAY in the lists above. One adds up the bytes of the arrays, the other the bytes
+ * of the pointers to them. */
 #define EITS_ADD_BYTES(place, element, count)   +EITS_ALIGN16((size_t)(count) * sizeof(element))
 #define EITS_ADD_POINTER(place, element, count) +sizeof(void *)
 
 /* ---- The context itself ---- */
 
-/* Pointers to the arrays above; 14 more, to the model and its S, to the kernels, and to what the
- * solvers and the whitening borrow. */
+/* Bytes of pointers: one to each array above, and 14 more, to the model and its S, to the kernels,
+ * and to the arrays that the solvers and the whitening borrow. */
 #define EITS_CONTEXT_POINTERS                                                 \
     (14u * sizeof(void *) EITS_WORKSPACE_ARRAYS(EITS_ADD_POINTER, , , , , , ) \
                EITS_PREPARED_ARRAYS(EITS_ADD_POINTER, , ))
 
-/* Single numbers of the parts: 23 reals of reference and whitening, the shift of places by terms
- * along x and y; 35 counts and flags; and 13 parts, each of which ends at a multiple of eight
- * bytes. */
+/* Bytes of single numbers: 23 reals of reference and whitening, the coefficients of the shift of
+ * places along x and y, 35 counts and flags, and padding, because each of 13 parts ends at a
+ * multiple of eight bytes. */
 #define EITS_CONTEXT_NUMBERS \
     ((23u + 2u * EITS_MAX_MOVE_TERMS) * sizeof(eits_real) + (35u + 13u) * sizeof(uint32_t))
 
-/* The multipole model keeps a pixel and a mirror per touch and the weights of the pixels around one
- * inside the skin, the joint fit its gradient and what it has taken of its budget. */
+/* Bytes of numbers for the joint fit. The multipole model keeps a pixel and a mirror per touch, and
+ * the weights of the pixels around a pixel inside the skin. The joint fit keeps its gradient and
+ * the part of its budget that it has spent. */
 #define EITS_JOINT_NUMBERS                                            \
     (EITS_MAX_TOUCHES * (4u * sizeof(eits_real) + sizeof(uint32_t)) + \
      2u * EITS_POLE_TERMS * EITS_POLE_POINTS * sizeof(eits_real) +    \
