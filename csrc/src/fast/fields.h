@@ -5,7 +5,7 @@
 #include "base/half.h"
 #include "fast/fast.h"
 
-/* E along x of each electrode's current, then along y. */
+/* Return a pixel's column: E along x of each electrode's current, then along y. */
 static inline const uint16_t *fast_column(const eits_fast *fast, uint32_t pixel)
 {
     const eits_matrix *at = &fast->model->fields.at;
@@ -17,7 +17,8 @@ static inline eits_real fast_number(uint16_t half)
     return (eits_real)eits_half_to_float(half);
 }
 
-/* The same of electrodes e and e + 1; past an odd number of them stands another of the column's. */
+/* Convert the numbers of electrodes e and e + 1. After an odd number of electrodes, the second is
+ * the column's next number, of another kind. */
 static inline void fast_two(const uint16_t *column, uint32_t e, eits_real value[2])
 {
     float both[2];
@@ -26,8 +27,9 @@ static inline void fast_two(const uint16_t *column, uint32_t e, eits_real value[
     value[1] = (eits_real)both[1];
 }
 
-/* A pixel's column in numbers: the fields and the mirror's four. It is converted once and kept
- * until another pixel needs its place; the pixels of a touch have places apart. */
+/* Return a pixel's column as eits_real: the fields and the mirror's four numbers. It is converted
+ * once and kept until another pixel needs its place. The pixels of one touch have different places.
+ */
 static inline const eits_real *fast_field(const eits_fast *fast, uint32_t pixel)
 {
     const eits_pixel *at = &fast->model->pixel[pixel];
@@ -44,18 +46,19 @@ static inline const eits_real *fast_field(const eits_fast *fast, uint32_t pixel)
     return kept;
 }
 
-/* Pixels whose centres may lie in a soft disc: every `every`-th of a range; in pixels from the
+/* The pixels whose centres may lie in a soft disc: every `every`-th of a range, in pixels from the
  * grid's corner. */
 typedef struct fast_window {
     uint32_t x0, x1, y0, y1, every;
     eits_real x, y, scale;
 } fast_window;
 
-/* rows.c: 0 where no pixel of the grid is near. */
+/* rows.c: compute the window. Returns 0 if no pixel of the grid is near. */
 int eits_fast_window(const eits_fast *fast, const eits_real *place, eits_real rho2,
                      fast_window *window);
 
-/* 1 - d^2 / rho^2 of a pixel, at dx, dy pixels from the place; 0 where none is kept there. */
+/* Return 1 - d^2 / rho^2 for a pixel at dx, dy pixels from the place; 0 if no pixel is kept there.
+ */
 static inline eits_real fast_weight(const eits_fast *fast, const fast_window *w, uint32_t ix,
                                     uint32_t iy, uint32_t *pixel, eits_real *dx, eits_real *dy)
 {
