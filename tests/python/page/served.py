@@ -23,7 +23,7 @@ FLAGS = (
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 
-def until(what: Callable[[], Any], seconds: float = 30.0) -> Any:
+def until(what: Callable[[], Any], seconds: float = 60.0) -> Any:
     """What ``what`` gives once it is true."""
     end = time.monotonic() + seconds
     while not (value := what()):
@@ -47,7 +47,7 @@ def serving(url: str, mode: Stream = ALL, **more: Any) -> Iterator[PageServer]:
         yield server
     finally:
         server.stop()
-        thread.join(10.0)
+        thread.join(30.0)
         assert not thread.is_alive()
 
 

@@ -176,16 +176,30 @@ def test_gestures_and_zones(page):
         assert "far" not in page.text("gestures")
 
 
+def one_frame(server: PageServer) -> None:
+    """Let a paused scene go on by one frame."""
+    before = server.reader.frames
+    server.reader.live().pacer.step()
+    until(lambda: server.reader.frames > before)
+
+
 def test_teaching_press_by_press(page, tmp_path):
-    """A finger presses where the plan says; the presses become a model that the board then has."""
+    """A finger presses where the plan says; the presses become a model that the board then has.
+    The scene waits until the page is open, and again where the page must say "hold still"."""
     skin, scene, presses = paper_skin(), tmp_path / "practice.toml", tmp_path / "presses.npz"
     plan = plan_places(skin, adjacent(16), 6)
     text = practice_scene(skin, Path("none"), plan)
     scene.write_text(text.replace('skin = "none"\n', ""), encoding="utf-8")
     teacher = Teacher(plan, presses)
-    with serving(f"sim:{scene}?loop=1", Stream.RAW, teacher=teacher, speed=3.0) as server:
+    with serving(f"sim:{scene}?loop=1", Stream.RAW, teacher=teacher, speed=0.01) as server:
+        pacer = server.reader.live().pacer
+        pacer.pause()
         page.open(server)
+        while teacher.facts()["step"] != "hold" and server.reader.frames < 60:
+            one_frame(server)
         until(lambda: "hold still" in page.text("teach-text"))
+        pacer.set_speed(3.0)
+        pacer.play()
         until(lambda: page.text("teach-text") == "all places are done")
         assert page.text("teach-count") == "6 of 6 presses"
         taken = load_presses(presses)

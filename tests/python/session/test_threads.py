@@ -242,12 +242,20 @@ def test_one_iterator_in_two_threads():
     with opened("on a port") as board, ThreadPoolExecutor(1, thread_name_prefix="reader") as pool:
         frames = board.stream(Stream.RAW)
         next(frames)
-        board.record(lambda packet: time.sleep(0.3))  # nothing comes for a while
-        waits = pool.submit(lambda: [next(frames) for _ in range(3)])
-        time.sleep(0.1)
+        refused, reading = threading.Event(), threading.Event()
+        board.record(lambda packet: refused.wait(10))  # nothing comes meanwhile
+
+        def read() -> list[object]:
+            reading.set()
+            return [next(frames) for _ in range(3)]
+
+        waits = pool.submit(read)
+        reading.wait()
+        time.sleep(0.1)  # it is inside of  next  then
         for use in (frames.__next__, frames.close):  # type: ignore[attr-defined]
             with pytest.raises(UsageError, match="read by thread 'reader_0'; end the loop"):
                 use()
+        refused.set()
         assert len(waits.result(10)) == 3
         board.record(None)
 
@@ -255,12 +263,11 @@ def test_one_iterator_in_two_threads():
 @pytest.mark.parametrize("kind", ["pumped", "on a port"])
 def test_a_device_that_another_thread_closes_ends_the_stream(kind):
     with opened(kind) as board, ThreadPoolExecutor(1) as pool:
-        following = pool.submit(lambda: sum(1 for _ in board.stream(Stream.RAW)))
-        time.sleep(0.3)
-        began = time.monotonic()
+        came = threading.Event()
+        following = pool.submit(lambda: [came.set() for _ in board.stream(Stream.RAW)])
+        came.wait()
         board.close()
-        error = following.exception(5)
-        assert time.monotonic() - began < 2.5
+        error = following.exception(20)
         assert isinstance(error, DeviceError)
         assert "it was closed, in thread 'MainThread'; open it again" in str(error)
         with pytest.raises(DeviceError, match="it was closed"):
@@ -373,14 +380,21 @@ def test_what_cannot_be_pickled_says_what_to_do():
 
 
 def test_the_public_stream_in_two_threads():
-    frames = eitskin.stream(LOOP, speed=1.0)
-    next(frames)
+    frames = eitskin.stream(LOOP, speed=0.1)
+    numbers = [next(frames).number]
+    refused = threading.Event()
+
+    def read() -> None:
+        while not refused.is_set() or len(numbers) < 5:
+            numbers.append(next(frames).number)
+
     with ThreadPoolExecutor(1, thread_name_prefix="reader") as pool:
-        many = pool.submit(lambda: [next(frames) for _ in range(20)])
-        time.sleep(0.05)
+        reading = pool.submit(read)
+        while len(numbers) < 2:
+            time.sleep(0.01)
         with pytest.raises(UsageError, match="read by thread 'reader_0'"):
             next(frames)
-        assert [frame.number for frame in many.result(20)] == list(
-            range(many.result()[0].number, many.result()[0].number + 20)
-        )
+        refused.set()
+        reading.result(20)
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
     frames.close()  # type: ignore[attr-defined]
