@@ -2,9 +2,10 @@
  *
  * A board keeps S in flash as halves or bytes; unpacking a number costs as much as multiplying it
  * (kernels/m7.c has counts). The working set and the discs of a fit use the same few columns over
- * and over, so these are kept. A direct map both ways, slot[column] and column[slot], finds one
- * without a search; EITS_NO_PIXEL marks none. All that is asked for at once is there afterwards, or
- * nothing changes and the caller reads S itself: no product ever has columns of both kinds.
+ * and over, so these are kept. The direct maps slot[column] and column[slot] find a column without
+ * a search; EITS_NO_PIXEL marks an empty entry. After a request either all requested columns are
+ * cached, or nothing has changed and the caller reads S itself: no product mixes columns of both
+ * kinds.
  *
  * Only speed depends on the cache. Unpacking is exact, so results have the same bits without it. */
 #include "context/column_cache.h"
@@ -38,7 +39,8 @@ uint32_t eits_cache_columns(eits_columns *c, const eits_kernels *kernels, const 
         if (c->slot[index[k]] != EITS_NO_PIXEL)
             c->wanted[c->slot[index[k]]] = 1;
     }
-    /* Round and round, as in a clock: the oldest give way first, without a record of their use. */
+    /* The slots are reused in turn, so the oldest columns are replaced first, without a record of
+     * their use. */
     uint32_t slot = c->next;
     for (uint32_t k = 0; k < count; ++k) {
         if (c->slot[index[k]] != EITS_NO_PIXEL)
@@ -63,8 +65,8 @@ void eits_cache_slots(const eits_columns *c, const uint32_t *index, uint32_t cou
         slot[k] = c->slot[index[k]];
 }
 
-/* The same shape as S, so the same kernels read it; without scales, since unpacking leaves them
- * out and callers have them in their values. */
+/* The matrix has the same form as S, so the same kernels read it. It has no scales: unpacking
+ * leaves them out, and callers include them in their values. */
 eits_matrix eits_cached_columns(const eits_columns *c)
 {
     eits_matrix cached = *c->s;

@@ -80,7 +80,7 @@ typedef struct eits_reference {
 /* A row of eits_rows.masked that is left out of the present reference frame only. */
 enum { EITS_MASKED_NOW = 2 };
 
-/* Which rows and electrodes are used. Written by frame and diagnostics. */
+/* The rows and electrodes in use. Written by frame and diagnostics. */
 typedef struct eits_rows {
     uint8_t *masked; /* n_rows: 1 by the caller, EITS_MASKED_NOW by a reference frame */
     /* n_rows: why a row is left out of this frame, bits of eits_row_state; 0: it is used */
@@ -88,13 +88,14 @@ typedef struct eits_rows {
     uint8_t electrode[EITS_MAX_ELECTRODES]; /* bits of eits_electrode_state, of the last frame */
 } eits_rows;
 
-/* Which rows of a fold are in use. */
+/* The rows of a fold that are in use. */
 enum { EITS_SIDE_NONE = 0, EITS_SIDE_FIRST = 1, EITS_SIDE_SECOND = 2, EITS_SIDE_BOTH = 3 };
 
 /* One frame, folded and reduced. Written by frame. */
 typedef struct eits_frame {
     uint8_t *sides;      /* n_folded: EITS_SIDE_..., of the last frame */
-    uint8_t *kept_sides; /* n_folded: the last solved frame's, while another is examined */
+    uint8_t *kept_sides; /* n_folded: the sides of the last solved frame while another frame is
+                            examined */
     eits_real *d;        /* n_folded: data */
     /* n_folded: the difference of each fold's two rows; 0 if only one is in use */
     eits_real *reciprocity_error;
@@ -111,7 +112,8 @@ typedef struct eits_projection {
     eits_real *basis;
     uint32_t count;
     uint32_t stale;  /* 1: basis and whitening must be built again for the next frame */
-    uint32_t builds; /* counts the builds; by it others see that what they derived is out of date */
+    uint32_t builds; /* counts the builds, so that other modules notice when their derived data are
+                        out of date */
     /* n_folded: the data that gain drift causes; zeros if it is not ignored */
     eits_real *gain_drift;
 } eits_projection;
@@ -137,7 +139,7 @@ typedef struct eits_whitening {
     eits_real *row_strength; /* stride: (s_i / s_1)^2 */
     eits_real s1;            /* in the units of 1 / P */
     eits_real s1_square;     /* |S_1|^2 */
-    eits_real mu;            /* by which the model was whitened, over s_1^2 */
+    eits_real mu;            /* regularisation of the model's whitening, over s_1^2 */
     eits_real mu_in_force;   /* of this frame */
     eits_real square;        /* the scale of F'F */
     eits_real noise_ratio;   /* noise in max(S'F'y) over that with F = 1 */
@@ -184,21 +186,21 @@ typedef struct eits_solve_state {
 /* Memory of the touch fit. Written by touch. */
 typedef struct eits_touch_memory {
     eits_real *atoms;      /* EITS_MAX_TOUCHES x stride: the data that each disc causes */
-    eits_real *y_separate; /* stride: y less the touches' interaction */
+    eits_real *y_separate; /* stride: y minus the touches' interaction */
 } eits_touch_memory;
 
 /* Memory of the touch test. Written by evidence. */
 typedef struct eits_evidence {
     eits_real *factor; /* rank x stride: R in the rows of a triangle, Sigma = R'R */
-    /* EITS_EVIDENCE_COLUMNS x stride: R'^-1 times what each parameter moves the data by */
+    /* EITS_EVIDENCE_COLUMNS x stride: R'^-1 times the derivative of the data by each parameter */
     eits_real *column;
     eits_real *data;       /* stride: R'^-1 y */
-    eits_real *left;       /* stride: R'^-1 of what the touches leave of y */
-    eits_real *gain_drift; /* stride: R'^-1 of the projection's direction, of length 1 */
-    uint32_t drifts;       /* 1: it is in force */
-    uint32_t columns_made; /* since the test of this frame began */
-    uint32_t columns_most; /* in what is being tried; 0: any number */
-    uint32_t spent;        /* 1: the test wanted more columns than options.test_columns allows */
+    eits_real *left;       /* stride: R'^-1 times the residual of the touches */
+    eits_real *gain_drift; /* stride: R'^-1 times the direction of gain drift, scaled to length 1 */
+    uint32_t drifts;       /* 1: gain_drift is in use */
+    uint32_t columns_made; /* columns computed since the test of this frame began */
+    uint32_t columns_most; /* the present limit of columns_made; 0: no limit */
+    uint32_t spent;        /* 1: the test needed more columns than options.test_columns allows */
 } eits_evidence;
 
 /* Memory of the multipole model: L electrodes, slots of EITS_POLE_FIELD(L) numbers. Written by
@@ -206,12 +208,12 @@ typedef struct eits_evidence {
 typedef struct eits_multipole {
     eits_real *home;    /* EITS_MAX_TOUCHES slots: the fields about each touch's home pixel */
     eits_real *own;     /* EITS_MAX_TOUCHES slots: the fields' Taylor coefficients at its middle */
-    eits_real *induced; /* EITS_MAX_TOUCHES slots: what comes in from other touches and the rim */
-    eits_real *sent;    /* EITS_MAX_TOUCHES x EITS_POLE_SOURCE(L): what each sends out */
-    eits_real *work;    /* 6 slots, in disorder after each call */
+    eits_real *induced; /* EITS_MAX_TOUCHES slots: the field from other touches and the rim */
+    eits_real *sent;    /* EITS_MAX_TOUCHES x EITS_POLE_SOURCE(L): the field that each sends out */
+    eits_real *work;    /* scratch; undefined after each call */
     uint32_t home_pixel[EITS_MAX_TOUCHES]; /* EITS_NO_HOME: none is kept */
     eits_real mirror[EITS_MAX_TOUCHES][4]; /* a and b of the rim's mirror there, mm */
-    /* what each pixel around a home pixel inside the skin adds to the polynomial, complex */
+    /* weights of the pixels around a home pixel inside the skin in the polynomial, complex */
     eits_real inside[2 * EITS_POLE_TERMS * EITS_POLE_POINTS];
 } eits_multipole;
 #define EITS_NO_HOME UINT32_MAX
@@ -220,16 +222,16 @@ typedef struct eits_multipole {
 typedef struct eits_joint_memory {
     eits_real *weight; /* n_folded: 1 / sigma; 0 for a fold that is left out */
     eits_real *drift;  /* n_folded: the direction of the gain's drift in that metric, of length 1 */
-    eits_real *rest;   /* n_folded: what held shapes leave of the data (eits_joint_hold) */
+    eits_real *rest;   /* n_folded: the residual of the held shapes (eits_joint_hold) */
     eits_real *column; /* EITS_JOINT_PARAMETERS x EITS_JOINT_BLOCK */
     eits_real *along;  /* EITS_JOINT_PARAMETERS x EITS_JOINT_NUISANCES */
     eits_real *nuisance; /* their factor L, packed by rows (joint/metric.c) */
     uint32_t errors;     /* vectors of the model's errors in use */
     eits_real error_unit;
-    eits_real energy; /* |W d|^2 less its part along the drift: what no touches leave */
+    eits_real energy; /* |W d|^2 minus its part along the drift: the misfit without touches */
     eits_real *normal, *factor, *kept; /* EITS_JOINT_TRIANGLE each, packed by rows */
     uint64_t spent;                    /* multiply-accumulates of this frame's joint fits */
-    uint64_t evaluated;                /* and of the last evaluation with slopes */
+    uint64_t evaluated;                /* multiply-accumulates of the last evaluation with slopes */
     eits_real gradient[EITS_JOINT_PARAMETERS];
 } eits_joint_memory;
 

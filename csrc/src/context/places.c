@@ -1,11 +1,11 @@
-/* Where touches lie, by what the reference tells of electrodes and outline (frame/places.c learns
- * it). The polynomials are worth some sixty multiplications a touch. */
+/* Correct the places of touches for the displacement of electrodes and outline that the reference
+ * shows (frame/places.c learns it). The polynomials cost some sixty multiplications per touch. */
 #include "context/places.h"
 
 #include "base/vec.h"
 #include "context/constants.h"
 
-/* By how much a touch found at `at` lies elsewhere. */
+/* Compute the displacement of a touch that is found at `at`, mm. */
 static void shift_at(const eits_context *ctx, const eits_real at[2], eits_real shift[2])
 {
     const eits_model *model = ctx->model;

@@ -1,27 +1,30 @@
-/* From where the modelled skin has a touch to where it lies, and back. */
+/* Convert a touch's place in the modelled skin to its place on the real skin, and back. */
 #ifndef EITSKIN_PLACES_H
 #define EITSKIN_PLACES_H
 
 #include "context/context.h"
 
-/* Whether places are corrected by what the reference tells: with row gains, for which it holds. */
+/* Return 1 if places are corrected by the reference. This is so with row gains, for which the
+ * correction was computed. */
 int eits_corrects_places(const eits_context *ctx);
 
-/* Whether the model has what multipoles take: fields, and data that are differences. */
+/* Return 1 if the model fulfils the conditions of the multipole model: it has fields, and its data
+ * are differences. */
 int eits_has_poles(const eits_context *ctx);
 
-/* Whether touches are fitted jointly (joint/joint.h): the option is on, and the model has the
- * fields and the row errors that it takes. */
+/* Return 1 if touches may be fitted jointly (joint/joint.h): the option is on, and the model has
+ * the fields and the row errors for it. */
 int eits_may_fit_jointly(const eits_context *ctx);
 
-/* 1 where the reference is so far from the model that its errors matter in the joint fit, else 0:
- * the index of eits_row_errors.moves. */
+/* Return 1 if the reference is so far from the model that the model's errors matter in the joint
+ * fit, else 0. The result is an index of eits_row_errors.moves. */
 uint32_t eits_weighs_errors(const eits_context *ctx);
 
-/* at, mm: from where the modelled skin has a touch to where it lies; by at most EITS_MAX_SHIFT. */
+/* Change `at`, mm, from a touch's place in the modelled skin to its place on the real skin. The
+ * shift is at most EITS_MAX_SHIFT. */
 void eits_place_on_skin(const eits_context *ctx, eits_real at[2]);
 
-/* And back. */
+/* Change `at` back. */
 void eits_place_in_model(const eits_context *ctx, eits_real at[2]);
 
 #endif

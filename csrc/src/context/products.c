@@ -1,5 +1,5 @@
-/* S'v and S x on a context: the two products that a frame's time goes to, n_pixels x rank and
- * nonzeros x rank multiply-accumulates. Callers count them; these do not. */
+/* S'v and S x on a context: the two products that take most of a frame's time, n_pixels x rank and
+ * nonzeros x rank multiply-accumulates. The callers count them. */
 #include "context/products.h"
 #include "base/arithmetic.h"
 

@@ -1,5 +1,5 @@
-/* The kernels on what a context has of S: panels, cached columns or the stored matrix, whichever is
- * the fastest of those there are. Same bits. */
+/* Products with the fastest form of S that a context has: panels, cached columns or the stored
+ * matrix. All give the same bits. */
 #ifndef EITSKIN_PRODUCTS_H
 #define EITSKIN_PRODUCTS_H
 

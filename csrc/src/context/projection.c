@@ -12,8 +12,8 @@ uint64_t eits_take_out(const eits_context *ctx, const eits_real *directions, uin
 {
     const uint32_t rank = ctx->model->rank;
     const size_t stride = EITS_STRIDE(rank);
-    /* One direction after another, not all products first: in float32 the directions are orthogonal
-     * to rounding only, and so what one leaves of the next is seen. */
+    /* The directions are taken out one after another. In float32 they are orthogonal only up to
+     * rounding, and this order also removes what the step before has left. */
     for (uint32_t k = 0; k < count; ++k) {
         const eits_real *direction = directions + stride * k;
         eits_axpy(ctx->kernels, v, -eits_dot(ctx->kernels, direction, v, rank), direction, rank);

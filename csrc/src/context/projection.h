@@ -3,13 +3,13 @@
 
 #include "context/context.h"
 
-/* v (stride numbers) less its parts along `count` orthonormal directions, stride apart; returns the
- * multiply-accumulates. */
+/* Subtract from v (stride numbers) its parts along `count` orthonormal directions, one every stride
+ * numbers. Returns the multiply-accumulates. */
 uint64_t eits_take_out(const eits_context *ctx, const eits_real *directions, uint32_t count,
                        eits_real *v);
 
-/* The vector behind `count` directions becomes one more; 0 where these have all of its square but
- * `least`. */
+/* Make the vector behind `count` directions a further direction. Returns 0 if at most `least` of
+ * its square is outside the others. */
 int eits_add_direction(const eits_context *ctx, eits_real *directions, uint32_t count,
                        eits_real least, uint64_t *macs);
 

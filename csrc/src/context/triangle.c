@@ -2,8 +2,8 @@
 
 #include "base/vec.h"
 
-/* By rows, each row subtracted from all below it at once: the inner loop is axpy over a padded row,
- * which every processor here does well, and needs no gathering. */
+/* The factor is computed by rows: each row is subtracted from all rows below it. The inner loop is
+ * axpy over a padded row, which is fast on every processor here and needs no gathering. */
 uint64_t eits_triangle_factor(const eits_context *ctx, eits_real min_pivot, eits_real *n)
 {
     const uint32_t rank = ctx->model->rank;
@@ -28,7 +28,7 @@ void eits_triangle_solve(const eits_context *ctx, eits_real *triangle, eits_real
 {
     for (uint32_t i = ctx->model->rank; i-- > 0;) {
         const eits_real *row = row_of(ctx, triangle, i), before = v[i];
-        /* zero while its row is summed: the dot runs over the diagonal as well */
+        /* zero while its row is summed, because the dot product includes the diagonal */
         v[i] = 0;
         v[i] = (before - dot_of_row(ctx, i, row, v)) / row[i];
     }

@@ -5,14 +5,14 @@
 
 #include "context/context.h"
 
-/* Upper triangles, row after row. Row i has its columns from this one on, a multiple of 8, those
- * before i being zero: */
+/* Upper triangles are stored row after row. Return the first stored column of row i: a multiple of
+ * 8; the columns before i are zero. */
 static inline uint32_t first_of(uint32_t i)
 {
     return i & ~7u;
 }
 
-/* Row i, so that [k] is its column k; there is nothing before first_of(i). */
+/* Return row i such that [k] is its column k; columns before first_of(i) are not stored. */
 static inline eits_real *row_of(const eits_context *ctx, eits_real *triangle, uint32_t i)
 {
     const size_t stride = EITS_STRIDE(ctx->model->rank), block = i / 8u;
@@ -36,8 +36,8 @@ static inline void add_row(const eits_context *ctx, uint32_t i, eits_real *out, 
 }
 
 /* N = R'R, R in N's place. A pivot below `min_pivot` is raised to it. The strong directions come
- * first, so that what rounding leaves of a lost one weighs little. The numbers that N gathered in
- * its padding are set to zero. Returns the multiply-accumulates. */
+ * first, so that the rounding errors of a lost direction have little effect. Numbers in the padding
+ * of N are set to zero. Returns the multiply-accumulates. */
 uint64_t eits_triangle_factor(const eits_context *ctx, eits_real min_pivot, eits_real *n);
 
 /* v = T^-1 v, and v = T'^-1 v. */

@@ -1,18 +1,17 @@
-/* More touches than can be separated: reported, not guessed.
+/* Report frames with more touches than can be separated.
  *
- * Touches that overlap, or are many for so few electrodes, may be counted wrongly, and the fit
- * cannot know. A diagnostic says how likely that is instead of hiding it: a logistic model of
- * whether the count is right, from features that the fit has anyhow. In: the touches found,
- * info.unexplained, lambda_max and lambda_noise. Out: one bit; no touch is changed by it. Costs
- * nothing beside the fit. */
+ * Overlapping touches, or many touches with few electrodes, may be counted wrongly, and the fit
+ * cannot notice it. A logistic model estimates how likely the count is right, from features that
+ * the fit has computed anyway. In: the touches found, info.unexplained, lambda_max and
+ * lambda_noise. Out: one bit; no touch is changed. The cost is negligible beside the fit. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
-/* A linear score of what the touch fit found, the logarithm of the odds that every touch is found
- * and nothing else: fitted on mixed tuning scenes of 1 to 12 touches at 40, 60 and 80 dB by eitskin
- * study multitouch, whose page has how well it is calibrated. */
+/* The score is linear in features of the touch fit. It is the logarithm of the odds that all
+ * touches and no others were found. `eitskin study multitouch` fitted it on mixed tuning scenes of
+ * 1 to 12 touches at 40, 60 and 80 dB; its page shows the calibration. */
 static eits_real lesser(eits_real a, eits_real b)
 {
     return a < b ? a : b;
@@ -32,11 +31,11 @@ static eits_real nearest(const eits_touch *touches, uint32_t count)
     return min;
 }
 
-/* Of at least one touch.
+/* Return the score of at least one touch.
  *
- * Features that say how hard the scene is, in the order of what they were worth: touches that
- * overlap, a wide one that may be two, what no touch explains, the weakest against noise and
- * against what is left, and their number. */
+ * The features measure how difficult the scene is. In the order of their benefit: touches that
+ * overlap, a wide touch that may be two, the unexplained part of the data, the weakest touch
+ * against noise and against the residual, and the number of touches. */
 static eits_real score(const eits_context *ctx, const eits_touch *touches, uint32_t count)
 {
     const eits_real noise = ctx->info.lambda_noise, left = ctx->info.unexplained;

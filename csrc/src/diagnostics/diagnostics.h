@@ -5,13 +5,13 @@
 #include "context/context.h"
 #include "diagnostics/constants.h"
 
-/* Whether options.diagnostics asks for this diagnostic. */
+/* Return 1 if options.diagnostics asks for this diagnostic. */
 static inline int eits_wants(const eits_context *ctx, eits_diagnostic diagnostic)
 {
     return (ctx->options.diagnostics & (uint32_t)diagnostic) != 0;
 }
 
-/* Whether the two electrodes at `two` are e and f, either way round. */
+/* Return 1 if the two electrodes at `two` are e and f, in either order. */
 int eits_is_pair(const uint8_t *two, uint32_t e, uint32_t f);
 
 /* Leave row i, which is in use so far, out of this frame as an outlier, and count it. */
@@ -58,7 +58,7 @@ void eits_reference_unmask(eits_context *ctx);
 uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_scratch *scratch,
                                      const eits_real *frame);
 
-/* Find from the model what mismatch and prediction need to know about P and S. Once, by eits_init.
+/* Compute the numbers from P and S that mismatch and prediction need. eits_init calls it once.
  */
 void eits_learn_range(eits_context *ctx);
 
@@ -72,40 +72,40 @@ int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, ui
  * `gradient` is S'y; info.lambda_max must be known. */
 void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient);
 
-/* Withdraw that where touches explain the frame: few electrodes give a touch lobes of the other
- * sign. info.unexplained must be known, of at least one touch. */
+/* Clear STALE_REFERENCE if touches explain the frame: with few electrodes a touch has lobes of the
+ * other sign. info.unexplained must be known, and there must be at least one touch. */
 void eits_recheck_stale_reference(eits_context *ctx);
 
 /* Set STALE_REFERENCE if the frame has another scale than the reference. On entry rows.unusable
  * marks all rows that are left out. */
 void eits_check_scale(eits_context *ctx, const eits_real *frame);
 
-/* For taught models with reference tracking: whether the touches of this frame are in fact a change
- * of the skin itself, because they explain too little of the data. info.lambda_max and
+/* For taught models with reference tracking: return 1 if the touches of this frame are in fact a
+ * change of the skin itself, because they explain too little of the data. info.lambda_max and
  * info.unexplained must be known. */
 int eits_check_drift(eits_context *ctx);
 
 /* Set UNLIKE_MODEL if the reference is further from the model's than that of an uneven skin. */
 void eits_check_unlike_model(eits_context *ctx);
 
-/* The variance that the learned noise gives a fold's datum, summed over the folds in use. A fold
- * with copied reciprocals counts as one measurement. */
+/* Return the variance that the learned noise gives to a fold's datum, summed over the folds in use.
+ * A fold with copied reciprocals counts as one measurement. */
 eits_real eits_noise_energy(const eits_context *ctx);
 
-/* The part of |y|^2 that this noise causes. */
+/* Return the part of |y|^2 that this noise causes. */
 eits_real eits_expected_noise(const eits_context *ctx);
 
-/* Whether max(S'y) may be noise: then no frame is crowded. */
+/* Return 1 if max(S'y) may be noise: then no frame is crowded. */
 int eits_is_faint(const eits_context *ctx);
 
 /* Set CROWDED if `count` touches are more than can be separated. info.unexplained must be known. */
 void eits_check_crowd(eits_context *ctx, const eits_touch *touches, uint32_t count);
 
-/* second_moment.c: whether a lower triangle of section UNCE is positive semidefinite, to rounding.
- * Overwrites the scratch's square and row 5. */
+/* second_moment.c: return 1 if a lower triangle of section UNCE is positive semidefinite up to
+ * rounding. Overwrites the scratch's square and row 5. */
 int eits_is_covariance(const eits_context *ctx, const eits_scratch *scratch, const float *triangle);
 
-/* The k-th smallest of n numbers. Changes their order. */
+/* Return the k-th smallest of n numbers. Changes their order. */
 eits_real eits_kth(eits_real *v, uint32_t n, uint32_t k);
 
 #endif

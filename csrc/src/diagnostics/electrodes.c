@@ -4,11 +4,11 @@
  * and would show as a false touch. docs/reference/diagnostics.md has the rules, and
  * studies/results/diagnostics.md what they cost and how often they fail.
  *
- * Method: each row that has a clear reference is alive, dead (about nothing where there should be a
- * voltage) or turned (of the other sign, which no change of conductivity can cause). An electrode
- * is open if none of its rows is alive. A pair is bridged if both electrodes are alive in other
- * rows, but no row across the pair is. Three rows have to agree (EITS_ROWS_TO_JUDGE), since two may
- * fail together for other reasons.
+ * Method: each row that has a clear reference is alive, dead (almost no voltage) or turned (the
+ * other sign, which no change of conductivity can cause). An electrode is open if none of its rows
+ * is alive. A pair is bridged if both electrodes are alive in other rows, but no row across the
+ * pair is. Three rows have to agree (EITS_ROWS_TO_JUDGE), since two may fail together for other
+ * reasons.
  *
  * In: the frame's voltages, the reference with its noise, and in rows.unusable the faults that each
  * row shows by itself. Out: rows.electrode, rows.unusable, info. The cost is a few comparisons per
@@ -24,9 +24,9 @@ typedef struct limits {
     eits_real significant, noise;
 } limits;
 
-/* Against noise as well as against the reference: a row may have a reference smaller than the
- * noise, and is then neither dead nor alive. Many times the limit for being dead: the noise of a
- * significant row then never makes it look dead. */
+/* A row is compared with the noise as well as with the reference: a row whose reference is smaller
+ * than the noise is neither dead nor alive. A significant row must exceed the limit of a dead row
+ * many times, so that its noise never makes it look dead. */
 static limits limits_of(const eits_context *ctx)
 {
     const eits_real fraction = EITS_ROW_SIGNIFICANT * ctx->reference.v0_rms,
@@ -37,9 +37,9 @@ static limits limits_of(const eits_context *ctx)
                     noise};
 }
 
-/* Only rows with a clear reference tell anything: a row that is small by geometry is small with
- * an open electrode, too. A dead row is one without the signal that it should have, whichever
- * way that came about: no number, saturated, or nothing. */
+/* Only rows with a clear reference allow a conclusion: a row that is small by geometry is also
+ * small with an open electrode. A dead row lacks the signal that it should have: it is not a
+ * number, saturated, or near zero. */
 static int judge_row(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t i)
 {
     const eits_real v0 = ctx->reference.v0[i], size = eits_fabs(v0);
@@ -55,11 +55,11 @@ static int judge_row(const eits_context *ctx, const eits_real *frame, limits lim
     return along > -limit ? DEAD : ALIVE | TURNED;
 }
 
-/* Far beyond what a touch makes of a row, be its reference ever so small.
+/* Return 1 if the row is far larger than any touch can make it, even if its reference is small.
  *
- * A touch lowers or raises a row by parts of itself; a floating input or a broken amplifier
- * gives many times as much. Measured against a part of the reference's rms at least, since a
- * row near zero may grow by any factor. */
+ * A touch lowers or raises a row by a fraction of itself; a floating input or a broken amplifier
+ * gives many times as much. The reference counts as at least a fraction of the rms of all
+ * references, because a row near zero may grow by any factor. */
 static int is_grown(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t i)
 {
     const eits_real v0 = eits_fabs(ctx->reference.v0[i]),
@@ -68,7 +68,7 @@ static int is_grown(const eits_context *ctx, const eits_real *frame, limits lim,
            eits_fabs(frame[i]) > eits_fma(EITS_ROW_GROWN, v0 > min ? v0 : min, lim.noise);
 }
 
-/* Whether row i uses an electrode in this state. */
+/* Return 1 if row i uses an electrode in this state. */
 static int uses(const eits_context *ctx, uint32_t i, eits_electrode_state state)
 {
     const uint8_t *row = eits_row(ctx, i);
@@ -102,8 +102,8 @@ static void count_row(evidence *of, uint8_t *alive, const uint8_t *row, int stat
     }
 }
 
-/* Whether electrode e drives with several others, in rows that allow a conclusion. With only one
- * partner, a bridge between the two would stop its current as well. */
+/* Return 1 if electrode e drives with several others, in rows that allow a conclusion. With only
+ * one partner, a bridge between the two would stop its current as well. */
 static int has_partners(const eits_context *ctx, const eits_real *frame, limits lim, uint32_t e)
 {
     uint32_t partner = EITS_MAX_ELECTRODES;
@@ -141,7 +141,7 @@ static int find_open(eits_context *ctx, const eits_real *frame, limits lim, uint
                      (of.silent[e] == EITS_ROWS_TO_JUDGE && has_partners(ctx, frame, lim, e));
         open += is_open[e];
     }
-    /* All electrodes at once is a plug that is out, or a supply. */
+    /* If all electrodes are open at once, a plug is out or a supply has failed. */
     if (open == judged)
         return 0;
     if (open == 0 || !eits_wants(ctx, EITS_DIAGNOSTIC_ELECTRODE_OPEN))
@@ -154,18 +154,18 @@ static int find_open(eits_context *ctx, const eits_real *frame, limits lim, uint
     return 1;
 }
 
-/* Polarity does not matter to a bridge, nor to a channel. */
+/* The polarity does not matter for a bridge or a channel. */
 int eits_is_pair(const uint8_t *two, uint32_t e, uint32_t f)
 {
     return (two[0] == e && two[1] == f) || (two[0] == f && two[1] == e);
 }
 
-/* Whether all significant rows that drive or measure across (e, f), and use no open electrode, are
- * dead, and enough of them.
+/* Return 1 if all significant rows that drive or measure across (e, f), and use no open electrode,
+ * are dead, and if there are enough of them.
  *
- * A bridge puts both electrodes on one potential: rows that drive across it drive nothing, rows
- * that measure across it measure nothing, and all others go on. Rows through an open electrode
- * are dead anyhow and prove nothing. */
+ * A bridge puts both electrodes on one potential: rows that drive across it drive no current
+ * through the skin, rows that measure across it measure no voltage, and all other rows still work.
+ * Rows through an open electrode are dead in any case and prove nothing. */
 static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits lim, uint8_t e,
                         uint8_t f)
 {
@@ -176,7 +176,8 @@ static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits 
             uses(ctx, i, EITS_ELECTRODE_OPEN))
             continue;
         const int state = judge_row(ctx, frame, lim, i);
-        /* One row that lives across the pair: then there is a voltage across it, and no bridge. */
+        /* If one row across the pair is alive, there is a voltage across it, so there is no bridge.
+         */
         if ((state & ALIVE) != 0)
             return 0;
         dead += state == DEAD;
@@ -184,9 +185,9 @@ static int pair_is_dead(const eits_context *ctx, const eits_real *frame, limits 
     return dead >= EITS_ROWS_TO_JUDGE;
 }
 
-/* Both of a bridged pair are alive in rows that use one of them alone.
+/* Find bridged pairs: both electrodes are alive in rows that use only one of them.
  *
- * Starts from dead rows, which are few, rather than from all pairs. */
+ * The search starts from dead rows, because they are few, and not from all pairs. */
 static void find_bridged(eits_context *ctx, const eits_real *frame, limits lim,
                          const uint8_t *alive)
 {
@@ -206,8 +207,8 @@ static void find_bridged(eits_context *ctx, const eits_real *frame, limits lim,
     }
 }
 
-/* 64 bits name the first 64 electrodes; rows.electrode has the states of all. A frame begins with
- * none, and none is taken back. */
+/* 64 bits name the first 64 electrodes; rows.electrode has the states of all. A frame begins
+ * without named electrodes, and a name is not withdrawn. */
 void eits_name_electrodes(eits_context *ctx)
 {
     eits_info *info = &ctx->info;
@@ -220,7 +221,7 @@ void eits_name_electrodes(eits_context *ctx)
     }
 }
 
-/* A row needs all four of its electrodes. */
+/* A row is left out if any of its four electrodes is in this state. */
 void eits_leave_electrodes(eits_context *ctx, eits_electrode_state state, eits_row_state why)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
@@ -236,7 +237,8 @@ void eits_leave_outlier(eits_context *ctx, uint32_t i)
     ctx->info.diagnostics |= EITS_DIAGNOSTIC_OUTLIER;
 }
 
-/* Rows that the model cannot give, if they are few; more of them are a mismatch. */
+/* Leave out rows with values that the model cannot give, if they are few. More of them are a
+ * mismatch. */
 static void leave_impossible(eits_context *ctx, const eits_real *frame, limits lim)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
@@ -245,13 +247,13 @@ static void leave_impossible(eits_context *ctx, const eits_real *frame, limits l
     }
 }
 
-/* Three stages, cheapest first, as a frame without a fault ends at the first: count rows by state;
- * look for open electrodes; look for bridges among what is left. Open electrodes come before
- * bridges, since their dead rows would speak for a bridge as well. */
+/* There are three stages, the cheapest first, because a frame without a fault ends at the first:
+ * count rows by state, look for open electrodes, look for bridges among the remaining rows. Open
+ * electrodes come before bridges, because their dead rows would look like a bridge as well. */
 int eits_find_electrodes(eits_context *ctx, const eits_real *frame)
 {
     const limits lim = limits_of(ctx);
-    /* silent: dead, though they can be used */
+    /* silent: dead, although they can be used */
     uint32_t dead = 0, silent = 0, turned = 0, grown = 0;
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
         const int state = judge_row(ctx, frame, lim, i);
@@ -260,7 +262,7 @@ int eits_find_electrodes(eits_context *ctx, const eits_real *frame)
         turned += (state & TURNED) != 0;
         grown += (uint32_t)is_grown(ctx, frame, lim, i);
     }
-    /* Many turned rows are a skin of another kind, or another order of wires. */
+    /* Many turned rows show another kind of skin, or another order of wires. */
     if (turned >= EITS_ROWS_TO_JUDGE && eits_wants(ctx, EITS_DIAGNOSTIC_MODEL_MISMATCH))
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_MODEL_MISMATCH;
     if (turned + grown > 0 && turned + grown < EITS_ROWS_TO_JUDGE &&

@@ -1,5 +1,5 @@
-/* How much of the data lies outside the model's range, and a reference that was taken with a touch
- * on the skin. */
+/* Find data that lie outside the model's range, and a reference that was taken with a touch on the
+ * skin. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"
@@ -8,9 +8,9 @@
 #include "frame/whitening.h"
 #include "kernels/column.h"
 
-/* The rows of P are orthogonal, so that |d|^2 - sum (P d)_i^2 / |P_i|^2 is what lies outside of
- * them. `shrink`: ridge weights s_i^2 / (s_i^2 + nu s_1^2) over |P_i|^2, so that P' shrink P d is
- * what the rows predict of d. */
+/* The rows of P are orthogonal, so |d|^2 - sum (P d)_i^2 / |P_i|^2 is the squared part of d outside
+ * their range. `shrink` has the ridge weights s_i^2 / (s_i^2 + nu s_1^2) over |P_i|^2, so P' shrink
+ * P d is the prediction of d. */
 void eits_learn_range(eits_context *ctx)
 {
     const eits_row_form *form = &ctx->model->row_form;
@@ -27,11 +27,12 @@ void eits_learn_range(eits_context *ctx)
     ctx->range.known = rank > 0 && eits_all_finite(ctx->range.shrink, rank);
 }
 
-/* range.off_range = what of the drift the model cannot give: along - P' |P_i|^-2 P along, in
- * full, since differences of sums would be rounding.
+/* Compute range.off_range, the part of gain drift outside the model's range: along - P' |P_i|^-2 P
+ * along. The vector itself is computed, because a difference of squared sums would consist of
+ * rounding.
  *
- * Found once for each basis: the drift of the gain moves the data along the reference, part of
- * which the model cannot give. That part is no fault of the frame. */
+ * This is done once per basis. Gain drift moves the data along the reference, a part of which lies
+ * outside the model's range. That part is not a fault of the frame. */
 static uint64_t learn_off_range(eits_context *ctx, const eits_scratch *scratch)
 {
     eits_real *copy = scratch->row[0], *seen = scratch->row[3];
@@ -51,9 +52,9 @@ static uint64_t learn_off_range(eits_context *ctx, const eits_scratch *scratch)
     return 2u * (uint64_t)folds * rank;
 }
 
-/* What of |d|^2 noise alone would give: a fold's variance is that of the row it came from, or half
- * of it where two rows were averaged. A pair that agrees to the last bit was copied, not measured
- * twice, and has the variance of one. */
+/* Return the |d|^2 that noise alone would give. The variance of a fold is that of its row, or half
+ * of it if two rows were averaged. A pair that agrees to the last bit was copied and not measured
+ * twice, so it has the variance of one row. */
 eits_real eits_noise_energy(const eits_context *ctx)
 {
     const eits_reference *b = &ctx->reference;
@@ -83,8 +84,8 @@ int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, ui
 {
     eits_real *weighed = scratch->row[3];
     const uint32_t folds = ctx->model->n_folded, rank = ctx->model->rank;
-    /* A model that keeps every direction has no outside. Without noise there is no telling what is
-     * much. */
+    /* A model that keeps every direction has no data outside its range. Without a known noise, no
+     * limit can be set. */
     if (rank >= folds || !(ctx->reference.noise_v > 0))
         return 0;
     const eits_real drift =
@@ -95,7 +96,7 @@ int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, ui
         weighed[i] = ctx->range.inverse[i] * ctx->frame.y[i];
     eits_real total = eits_dot(ctx->kernels, ctx->frame.d, ctx->frame.d, folds),
               off = total - eits_dot(ctx->kernels, weighed, ctx->frame.y, rank);
-    if (drift > 0) { /* how far it drifted is no news */
+    if (drift > 0) { /* the amount of drift is not part of the mismatch */
         const eits_real along =
                             eits_dot(ctx->kernels, ctx->frame.d, ctx->projection.gain_drift, folds),
                         along_off_range =
@@ -105,12 +106,13 @@ int eits_check_model_mismatch(eits_context *ctx, const eits_scratch *scratch, ui
         total -= along * along / drift;
         off -= off_range > 0 ? along_off_range * along_off_range / off_range : 0;
     }
-    /* Of the folds' noise, the share of the dimensions that the model leaves free. */
+    /* The noise outside the range is the fraction of the folds' noise that belongs to the
+     * dimensions outside it. */
     const eits_real noise = eits_noise_energy(ctx) * (eits_real)(folds - rank) / (eits_real)folds;
     if (!(off > noise) || !(total > 0))
         return 0;
-    /* In the data's own size, so that 0.05 means five per cent of the change, at any strength of
-     * touch. */
+    /* The result is relative to the data: 0.05 means five per cent of the change, for a touch of
+     * any strength. */
     const eits_real fraction = eits_sqrt((off - noise) / total);
     ctx->info.model_mismatch = fraction < 1 ? fraction : 1;
     return fraction > EITS_MISMATCH_FRACTION &&
@@ -124,13 +126,14 @@ void eits_check_stale_reference(eits_context *ctx, const eits_real *gradient)
     if (sign == EITS_SIGN_BOTH || !eits_wants(ctx, EITS_DIAGNOSTIC_STALE_REFERENCE))
         return;
     const eits_sign other = sign == EITS_SIGN_INCREASE ? EITS_SIGN_DECREASE : EITS_SIGN_INCREASE;
-    /* Touches go one way. A change that the data want the other way more is a touch that was there
-     * at the tare, seen from behind. */
+    /* Touches have one sign. If the change is greater with the other sign, a touch that was on the
+     * skin during the tare has been removed. */
     const eits_real against = eits_greatest(ctx->kernels, gradient, ctx->model->n_pixels, other);
     const eits_real min = EITS_STALE_NOISE * ctx->info.lambda_noise;
     if (!(min > 0 && against > EITS_STALE_RATIO * ctx->info.lambda_max && against > min))
         return;
-    /* The diagnostic stays if another scale raised it before: touches do not explain that. */
+    /* If a different scale has raised the diagnostic before, it stays: touches do not explain that.
+     */
     ctx->range.against = (ctx->info.diagnostics & EITS_DIAGNOSTIC_STALE_REFERENCE) == 0;
     ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
 }
@@ -141,10 +144,10 @@ void eits_recheck_stale_reference(eits_context *ctx)
         ctx->info.diagnostics &= ~(uint32_t)EITS_DIAGNOSTIC_STALE_REFERENCE;
 }
 
-/* The direction of gain drift is ignored, so that a frame of many times the reference's size would
- * lose its touches without a word: what is left of them is judged against that size. The scale is
- * a ratio of sums and not of squares, so that no row counts for much and nothing overflows but what
- * is far too large. */
+/* The direction of gain drift is ignored. A frame of many times the reference's size would
+ * therefore lose its touches without a report, because their data are compared with that size. The
+ * scale is a ratio of sums and not of squares, so that no single row dominates, and only numbers
+ * that are far too large overflow. */
 void eits_check_scale(eits_context *ctx, const eits_real *frame)
 {
     const eits_real *v0 = ctx->reference.v0;
@@ -160,10 +163,10 @@ void eits_check_scale(eits_context *ctx, const eits_real *frame)
         ctx->info.diagnostics |= EITS_DIAGNOSTIC_STALE_REFERENCE;
 }
 
-/* A taught model brings the noise's own metric, in which touches explain nearly all of a press and
- * less of what drifts. Without this the first false touch would stop the reference for good. The
- * clearer a touch is, the more it may leave; what stands far out of the noise is one, of whatever
- * shape. Models from physics have the test of touches for this (evidence/). */
+/* A taught model has the metric of the noise, in which touches explain nearly all of a press but
+ * less of a drift. Without this check the first false touch would stop reference tracking for good.
+ * A clearer touch may leave more unexplained, and a change far above the noise is a touch, whatever
+ * its shape. Models from physics use the touch test instead (evidence/). */
 int eits_check_drift(eits_context *ctx)
 {
     const eits_real level = ctx->info.lambda_noise > 0 ? eits_detection_threshold(ctx)

@@ -13,21 +13,21 @@
  * Technometrics 16 (1974) 125, for one; blockwise for several). So all flagged folds together cost
  * one product with P and a Cholesky factor of at most eight by eight.
  *
- * Where a scan has no reciprocals only the prediction is left, and one fold at most is taken out.
- * Where more than eight folds are flagged no single reading is at fault: whatever electrode or
- * channel nearly all of them share is (find_noisy).
+ * Without reciprocals only the prediction is available, and at most one fold is left out. If more
+ * than eight folds are flagged, the cause is not a single reading but an electrode or channel that
+ * nearly all of them share (find_noisy).
  *
  * In: frame.d, .reciprocity_error, .sides of the folded frame; the reference's noise; P. Out: bits
- * in rows.unusable, info. The caller folds the frame again where anything was marked. */
+ * in rows.unusable, info. The caller folds the frame again if any row was marked. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/cholesky.h"
 #include "base/vec.h"
 #include "kernels/column.h"
 
-/* A median without sorting, in linear time on average and in place: no memory is needed. Equal
- * numbers are swapped, which keeps the parts balanced where many are the same, as quantised
- * differences are. */
+/* This finds a median without sorting, in linear time on average and without more memory. Equal
+ * numbers are swapped, which keeps the two parts balanced if many numbers are equal, as with
+ * quantised differences. */
 eits_real eits_kth(eits_real *v, uint32_t n, uint32_t k)
 {
     uint32_t low = 0, high = n - 1;
@@ -58,15 +58,15 @@ eits_real eits_kth(eits_real *v, uint32_t n, uint32_t k)
     return v[k];
 }
 
-/* What a fold's sides may differ by. */
+/* Limits of the difference between the two sides of a fold. */
 typedef struct tolerance {
-    /* > 0 where no noise was learned: the most by the differences of all folds */
+    /* the limit by the differences of all folds, used if no noise was learned; else 0 */
     eits_real robust;
     eits_real largest; /* fraction of the largest datum */
 } tolerance;
 
-/* Two readings of one quantity differ by root two times the noise of one. Where data are ratios,
- * the noise of each row is over its own reference. */
+/* Two readings of one quantity differ by root two times the noise of one. If data are ratios, the
+ * noise of each row is divided by its own reference. */
 static eits_real max_by_noise(const eits_context *ctx, uint32_t k)
 {
     const eits_reference *b = &ctx->reference;
@@ -78,9 +78,9 @@ static eits_real max_by_noise(const eits_context *ctx, uint32_t k)
     return EITS_OUTLIER_NOISE * eits_sqrt(eits_fma(first, first, second * second));
 }
 
-/* Three tests that all have to fail the fold: more than noise explains, not small beside the
- * frame's greatest datum (a common mode scales with that), and not small beside the fold's own
- * datum (channel gains that differ scale with that). */
+/* A fold is flagged if its difference exceeds all three limits: that of noise, a fraction of the
+ * frame's greatest datum (a common-mode error scales with it), and a fraction of the fold's own
+ * datum (the error of unequal channel gains scales with it). */
 static int is_flagged(const eits_context *ctx, uint32_t k, tolerance tol)
 {
     if (ctx->frame.sides[k] != EITS_SIDE_BOTH)
@@ -92,10 +92,10 @@ static int is_flagged(const eits_context *ctx, uint32_t k, tolerance tol)
     return off > EITS_OUTLIER_FRACTION * eits_fma(R(0.5), off, eits_fabs(ctx->frame.d[k]));
 }
 
-/* The median of the folds' differences is 0 where they are copies: then nothing is flagged.
+/* The median of the folds' differences is 0 if reciprocal rows are copies; then no fold is flagged.
  *
- * Noise, if it was learned, is judged row by row; if not, by the differences that this frame
- * has. And whatever is small beside the greatest datum does no harm in the image. */
+ * A learned noise gives a limit for each row; otherwise the differences of this frame give one. A
+ * difference that is small beside the greatest datum does no harm in the image. */
 static tolerance find_tolerance(const eits_context *ctx, const eits_scratch *scratch)
 {
     tolerance tol = {0, 0};
@@ -116,7 +116,7 @@ static tolerance find_tolerance(const eits_context *ctx, const eits_scratch *scr
     return tol;
 }
 
-/* A row that is out for another reason keeps that one, and is not counted twice. */
+/* A row that is left out for another reason keeps that reason, and is not counted twice. */
 static void leave_row(eits_context *ctx, uint32_t row)
 {
     if (row == EITS_FOLD_NONE || ctx->rows.unusable[row] != 0)
@@ -124,9 +124,9 @@ static void leave_row(eits_context *ctx, uint32_t row)
     eits_leave_outlier(ctx, row);
 }
 
-/* ---- what the other folds predict ---- */
+/* ---- prediction by the other folds ---- */
 
-/* The fit's matrix is that of all folds: with one missing, H is another. */
+/* H is the fit's matrix for all folds; it is not valid if one is missing. */
 static int all_known(const eits_context *ctx)
 {
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
@@ -158,8 +158,8 @@ static int predict(eits_context *ctx, const eits_scratch *scratch, const uint32_
     eits_real *weighed = scratch->row[0], *copy = scratch->row[1], *fit = scratch->row[3];
     eits_real lower[EITS_LOWER_SIZE(EITS_OUTLIER_MAX)], e[EITS_OUTLIER_MAX];
     const uint32_t rank = ctx->model->rank;
-    /* Leave-several-out from one fit of all: (I - H_FF) e = (d - H d)_F. There are at most
-     * EITS_OUTLIER_MAX folds in F, so this matrix is on the stack. */
+    /* Leaving several folds out follows from one fit to all folds: (I - H_FF) e = (d - H d)_F.
+     * There are at most EITS_OUTLIER_MAX folds in F, so this matrix is on the stack. */
     fit_all(ctx, scratch, macs);
     for (uint32_t a = 0; a < n; ++a) {
         const eits_real *column = eits_column(&ctx->model->reduction, flagged[a], copy);
@@ -172,7 +172,7 @@ static int predict(eits_context *ctx, const eits_scratch *scratch, const uint32_
             row[b] = (a == b ? R(1.0) : 0) - eits_dot(ctx->kernels, weighed, other, rank);
         }
         const eits_real pivot = eits_cholesky_row(lower, a);
-        /* The fit follows this fold wherever it goes: no other fold measures what it does. */
+        /* The fit follows this fold's own value: no other fold measures the same. */
         if (!(pivot > EITS_OUTLIER_PIVOT))
             return 0;
         row[a] = eits_sqrt(pivot);
@@ -185,10 +185,9 @@ static int predict(eits_context *ctx, const eits_scratch *scratch, const uint32_
     return 1;
 }
 
-/* The side that is clearly nearer to the prediction stays; else both go.
+/* Keep the side that is clearly nearer to the prediction; if neither is, leave both out.
  *
- * Half of a frame is often enough: dropping one side of a fold costs noise, dropping both costs
- * a measurement. */
+ * Without one side a fold only has more noise; without both sides a measurement is lost. */
 static void choose_sides(eits_context *ctx, const eits_scratch *scratch, const uint32_t *flagged,
                          uint32_t n, uint64_t *macs)
 {
@@ -201,7 +200,7 @@ static void choose_sides(eits_context *ctx, const eits_scratch *scratch, const u
                         half = R(0.5) * ctx->frame.reciprocity_error[flagged[a]];
         const eits_real first = known ? eits_fabs(d + half - predicted[a]) : 1,
                         second = known ? eits_fabs(d - half - predicted[a]) : 1;
-        /* Where neither is clearly nearer nobody knows which is wrong. */
+        /* If neither is clearly nearer, it is unknown which one is wrong. */
         if (!(first <= EITS_OUTLIER_NEARER * second))
             leave_row(ctx, fold.first);
         if (!(second <= EITS_OUTLIER_NEARER * first))
@@ -211,8 +210,8 @@ static void choose_sides(eits_context *ctx, const eits_scratch *scratch, const u
 
 /* ---- too many to be outliers ---- */
 
-/* Where one pair is what the flagged folds share, it is its channel: the rows measured across it
- * go, their reciprocals stay. */
+/* If the flagged folds share one pair, its channel is at fault: the rows that are measured across
+ * the pair are left out, and their reciprocals stay. */
 static void leave_channel(eits_context *ctx, uint32_t e, uint32_t f)
 {
     for (uint32_t i = 0; i < ctx->model->n_rows; ++i) {
@@ -221,7 +220,8 @@ static void leave_channel(eits_context *ctx, uint32_t e, uint32_t f)
     }
 }
 
-/* Whether each flagged fold drives across (e, f) on one side and measures across it on the other.
+/* Return 1 if each flagged fold drives across (e, f) on one side and measures across it on the
+ * other.
  */
 static int is_channel(const eits_context *ctx, uint32_t e, uint32_t f, tolerance tol)
 {
@@ -235,11 +235,11 @@ static int is_channel(const eits_context *ctx, uint32_t e, uint32_t f, tolerance
     return 1;
 }
 
-/* Electrodes that nearly all flagged folds use.
+/* Find the electrodes that nearly all flagged folds use.
  *
- * More flagged folds than single readings would give: whatever they share is the cause. One
- * electrode, two of them (a pair, perhaps one channel), or nothing in common, which no bad
- * contact does. */
+ * There are more flagged folds than single wrong readings would cause, so the cause is something
+ * that they share: one electrode, or two (a pair, perhaps one channel). If they share nothing, the
+ * cause is not a bad contact. */
 static void find_noisy(eits_context *ctx, uint32_t count, tolerance tol)
 {
     uint16_t shared[EITS_MAX_ELECTRODES] = {0};
@@ -256,7 +256,7 @@ static void find_noisy(eits_context *ctx, uint32_t count, tolerance tol)
         found[any < 2 ? any : 1] = e;
         ++any;
     }
-    if (any == 0) { /* no two-way network gives that */
+    if (any == 0) { /* no reciprocal network gives such data */
         ctx->info.diagnostics |=
             eits_wants(ctx, EITS_DIAGNOSTIC_MODEL_MISMATCH) ? EITS_DIAGNOSTIC_MODEL_MISMATCH : 0;
         return;
@@ -269,8 +269,8 @@ static void find_noisy(eits_context *ctx, uint32_t count, tolerance tol)
                                       : 0;
     ctx->info.diagnostics |= EITS_DIAGNOSTIC_ELECTRODE_NOISY;
     eits_name_electrodes(ctx);
-    /* One channel of an amplifier is worse than an electrode would be: only what it measures is
-     * wrong, not what it drives. */
+    /* With a faulty amplifier channel, unlike a bad electrode, only measurements are wrong and
+     * drives are right. */
     if (any == 2 && is_channel(ctx, found[0], found[1], tol))
         leave_channel(ctx, found[0], found[1]);
     else
@@ -279,9 +279,9 @@ static void find_noisy(eits_context *ctx, uint32_t count, tolerance tol)
 
 /* ---- without reciprocals ---- */
 
-/* Without reciprocals nothing bears a reading out but the model: the fold whose value all the
- * others predict worst. Only one at a time, and only where it stands far out of the prediction
- * errors, since a touch of an unknown shape is mispredicted as well. */
+/* Without reciprocals only the model can check a reading: an outlier is the fold that the others
+ * predict worst. At most one is left out, and only if its error is far above the other prediction
+ * errors, because a touch of an unknown shape is predicted badly as well. */
 int eits_find_unpaired_outlier(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {
     eits_real *copy = scratch->row[0], *fit = scratch->row[3], *error = scratch->value;
@@ -310,8 +310,8 @@ int eits_find_unpaired_outlier(eits_context *ctx, const eits_scratch *scratch, u
         }
     }
     *macs += 2u * (uint64_t)folds * rank;
-    /* Half the energy in one fold, and far beyond the others: a touch of a shape that the model
-     * lacks spreads over many. */
+    /* The fold must have half of the energy and an error far above the others: the errors of a
+     * touch whose shape the model lacks are spread over many folds. */
     if (!(worst * worst > EITS_OUTLIER_ENERGY * energy) ||
         !(worst > EITS_OUTLIER_UNPAIRED * EITS_ROBUST * eits_kth(error, folds, folds / 2)))
         return 0;
@@ -320,7 +320,8 @@ int eits_find_unpaired_outlier(eits_context *ctx, const eits_scratch *scratch, u
     return 1;
 }
 
-/* Needs folded data. Few flagged folds are single readings; many have a cause. */
+/* The data must be folded. A few flagged folds are single wrong readings; many have a common cause.
+ */
 int eits_find_outliers(eits_context *ctx, const eits_scratch *scratch, uint64_t *macs)
 {
     uint32_t flagged[EITS_OUTLIER_MAX], count = 0;

@@ -20,7 +20,8 @@
 
 #include "base/vec.h"
 
-/* Below are comparisons of `newer` with `older`; rows without a voltage in either do not count. */
+/* The functions below compare `newer` with `older`. Rows without a voltage in one of them do not
+ * count. */
 static int in_use(const eits_context *ctx, uint32_t row, const eits_real *older)
 {
     return row != EITS_FOLD_NONE && !ctx->rows.masked[row] && eits_is_finite(older[row]);
@@ -32,7 +33,8 @@ static eits_real change(const eits_context *ctx, uint32_t row, const eits_real *
     return in_use(ctx, row, older) ? newer[row] - older[row] : 0;
 }
 
-/* How far the changes of fold k's rows are apart; with `paired` 0 the greater of them. */
+/* Return the difference of the changes of fold k's rows; with `paired` 0, the greater of the
+ * changes. */
 static eits_real oddity(const eits_context *ctx, uint32_t k, const eits_real *newer,
                         const eits_real *older, int paired)
 {
@@ -46,7 +48,7 @@ static eits_real oddity(const eits_context *ctx, uint32_t k, const eits_real *ne
     return eits_larger(eits_fabs(first), eits_fabs(second));
 }
 
-/* The greater voltage of fold k's rows. */
+/* Return the greater voltage of fold k's rows. */
 static eits_real size_of(const eits_context *ctx, uint32_t k, const eits_real *older)
 {
     const eits_fold fold = ctx->model->fold[k];
@@ -55,7 +57,7 @@ static eits_real size_of(const eits_context *ctx, uint32_t k, const eits_real *o
     return eits_larger(first, second);
 }
 
-/* What an oddity may be; sets `paired` where reciprocals tell. */
+/* Return the limit of an oddity. Sets `paired` to 1 if reciprocal rows can be compared. */
 static eits_real limit_of(const eits_context *ctx, const eits_scratch *scratch,
                           const eits_real *newer, const eits_real *older, int *paired)
 {
@@ -65,8 +67,8 @@ static eits_real limit_of(const eits_context *ctx, const eits_scratch *scratch,
         const eits_real v = in_use(ctx, i, older) ? eits_fabs(older[i]) : 0;
         largest = v > largest ? v : largest;
     }
-    /* Reciprocals first: they are measured in the same frame, so nothing but noise may differ.
-     * Where they never do they are copies, and the change itself has to serve. */
+    /* Reciprocal rows are compared first: they are measured in the same frame, so they differ by
+     * noise only. If they never differ they are copies, and the changes themselves are used. */
     for (int way = 1; way >= 0; --way) {
         int any = 0;
         for (uint32_t k = 0; k < folds; ++k) {
@@ -85,7 +87,7 @@ static eits_real limit_of(const eits_context *ctx, const eits_scratch *scratch,
     return largest;
 }
 
-/* More than EITS_OUTLIER_MAX odd folds are a change of the skin: none is odd then. */
+/* More than EITS_OUTLIER_MAX odd folds are a change of the skin; then no fold is marked. */
 uint32_t eits_reference_compare(eits_context *ctx, const eits_scratch *scratch,
                                 const eits_real *newer, const eits_real *older, uint8_t bit)
 {
@@ -119,9 +121,9 @@ static uint32_t odd_rows(const eits_context *ctx, uint32_t k, const eits_real *n
     return count;
 }
 
-/* A reading that jumps in one of the reference frames would stay in every frame to come, as a
- * touch that never goes. Too many of them are no outliers but a skin that is touched or moved:
- * then all are left in, and noise says so. */
+/* A wrong reading in a reference frame would affect every later frame, like a touch that never
+ * ends. Too many of them are not outliers: the skin was touched or moved. Then all readings are
+ * kept, and the learned noise shows it. */
 uint32_t eits_reference_mask_outliers(eits_context *ctx, const eits_scratch *scratch,
                                       const eits_real *frame)
 {
@@ -139,8 +141,8 @@ uint32_t eits_reference_mask_outliers(eits_context *ctx, const eits_scratch *scr
     return left;
 }
 
-/* Three frames, two of which agree: the third tells which of the first two was wrong, and the
- * wrong reading takes the other's value. */
+/* Two of three frames agree: the third frame shows which of the first two was wrong, and the wrong
+ * reading gets the value of the other. */
 uint32_t eits_reference_weigh_second(eits_context *ctx, const eits_scratch *scratch,
                                      const eits_real *frame)
 {

@@ -1,16 +1,18 @@
-/* Whether a matrix of section UNCE is a covariance: positive semidefinite, to rounding.
+/* Check that a matrix of section UNCE is a covariance, that is, positive semidefinite up to
+ * rounding.
  *
  * The matrix is scaled to a diagonal of ones, and rows are eliminated, the one with the greatest
- * pivot first. Of a covariance nothing is left in the end; a matrix that has a negative direction
- * leaves a negative pivot, or numbers beside pivots of zero. Costs rank^3 / 2 multiply-accumulates,
- * once for each matrix of a model. */
+ * pivot first. A covariance leaves only zeros in the end. A matrix with a negative direction leaves
+ * a negative pivot, or other numbers beside pivots of zero. The cost is rank^3 / 2
+ * multiply-accumulates, once for each matrix of a model. */
 #include "diagnostics/diagnostics.h"
 
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
-/* C = A scaled; 0 if A is no matrix of second moments: an element is greater than its row and its
- * column allow. `scale` gets 1 / sqrt(A_ii), 0 of a row of zeros. */
+/* Compute C, the scaled A. Returns 0 if A cannot be a matrix of second moments, because an element
+ * is greater than the diagonal elements of its row and column allow. `scale` gets 1 / sqrt(A_ii),
+ * or 0 for a row of zeros. */
 static int scaled(const float *triangle, uint32_t rank, eits_real *square, eits_real *scale)
 {
     const uint32_t stride = EITS_STRIDE(rank);
@@ -34,7 +36,8 @@ static int scaled(const float *triangle, uint32_t rank, eits_real *square, eits_
 int eits_is_covariance(const eits_context *ctx, const eits_scratch *scratch, const float *triangle)
 {
     const uint32_t rank = ctx->model->rank, stride = EITS_STRIDE(rank);
-    eits_real *square = scratch->square, *left = scratch->row[5]; /* 1: the row is left */
+    eits_real *square = scratch->square,
+              *left = scratch->row[5]; /* 1: the row is not eliminated yet */
     if (!scaled(triangle, rank, square, left))
         return 0;
     for (uint32_t i = 0; i < rank; ++i)
