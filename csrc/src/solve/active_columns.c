@@ -1,17 +1,17 @@
-/* The active set's columns as they come and go, and their factor: rows K with K G K' = 1, G =
- * S_A'S_A the active columns' products.
+/* Add and drop the active set's columns, and keep their factor: rows K with K G K' = 1, where G =
+ * S_A'S_A has the products of the active columns.
  *
- * Newton's step of the active set is d = G^-1 b, again and again while columns come and go. A
- * Cholesky factor would give it by two triangular solves, each a chain of divisions in which every
- * number waits for the one before. K gives G^-1 = K'K, so the step is two plain products that
- * vector units run at full width, and no division at all. Price: K is dense after a drop, so a
- * solve costs 2 count^2 multiply-accumulates where triangles cost count^2. With the tens of columns
- * that a skin's frame has, that is less than one product with S.
+ * Newton's step of the active set is d = G^-1 b. It is computed many times while columns are added
+ * and dropped. A Cholesky factor would give it by two triangular solves, each a chain of divisions
+ * in which every number waits for the one before. K gives G^-1 = K'K, so the step is two plain
+ * products that vector units run at full width, and no division at all. The price: K is dense after
+ * a drop, so a solve costs 2 count^2 multiply-accumulates instead of the count^2 of triangles. With
+ * the tens of columns of a skin's frame, this is less than one product with S.
  *
- * Coming: one row appended, from the new column's projection on the others (Gram-Schmidt in the
- * metric G). Going: a reflection that puts the leaving column into one row, which is dropped; a
- * reflection is orthogonal, so rounding does not grow. K is never refactored within a solve; the
- * solver notices a factor gone wrong by an objective that rises, and goes on by another method
+ * To add a column, a row is appended, from the new column's projection on the others (Gram-Schmidt
+ * in the metric G). To drop a column, a reflection puts it into one row, and that row is dropped; a
+ * reflection is orthogonal, so rounding does not grow. K is never factored again within a solve. If
+ * it becomes wrong, the objective rises; the solver notices that and continues by another method
  * (active_set.c).
  *
  * In memory: rank rows of `stride` reals, only the first `count` rows and columns in use. Entries
@@ -35,8 +35,8 @@ static eits_real *row(const eits_context *ctx, uint32_t i)
     return ctx->solver.factor + EITS_STRIDE(ctx->model->rank) * i;
 }
 
-/* Two products with K instead of two triangular solves: no division, no chain in which each
- * number waits for the one before. */
+/* Two products with K replace two triangular solves: there is no division, and no number has to
+ * wait for the one before. */
 void eits_factor_solve(const eits_context *ctx, uint32_t count, eits_real *b, eits_real *w,
                        eits_real *d)
 {
@@ -47,8 +47,8 @@ void eits_factor_solve(const eits_context *ctx, uint32_t count, eits_real *b, ei
     ctx->kernels->rows_add(ctx->solver.factor, stride, count, length, w, d);
 }
 
-/* The new row is what makes the new column orthonormal to the others: (1, -d) over the root of
- * what is left of its square. */
+/* The new row makes the new column orthonormal to the others: (1, -d) over the root of the rest of
+ * its square. */
 static void append_row(eits_context *ctx, uint32_t count, const eits_real *d, eits_real left)
 {
     const eits_real fraction = 1 / eits_sqrt(left);
@@ -61,8 +61,8 @@ static void append_row(eits_context *ctx, uint32_t count, const eits_real *d, ei
 
 /* K G K' = 1 stays true under K -> H K for each orthogonal H. H is the Householder reflection that
  * takes column `place` of K to a multiple of the last unit vector: then no other row uses that
- * column any more, and without the last row it is gone (Golub and Van Loan, Matrix Computations,
- * section 5.1). The last column moves to its place, as the solver's lists do. */
+ * column, and dropping the last row removes it (Golub and Van Loan, Matrix Computations, section
+ * 5.1). The last column moves to its place, as the solver's lists do. */
 static void drop_row(eits_context *ctx, uint32_t count, uint32_t place, eits_real *scratch,
                      eits_real *more)
 {
@@ -74,9 +74,9 @@ static void drop_row(eits_context *ctx, uint32_t count, uint32_t place, eits_rea
         square += scratch[i] * scratch[i];
     }
     const eits_real norm = eits_sqrt(square), end = eits_fabs(scratch[last]);
-    /* the sign that does not cancel */
+    /* the sign that avoids cancellation */
     scratch[last] = scratch[last] < 0 ? -(norm + end) : norm + end;
-    /* Householder's vector v = scratch; rows less twice v (v'rows) / |v|^2. */
+    /* Householder's vector v = scratch; each row minus 2 v (v'row) / |v|^2. */
     const eits_real twice = norm > 0 ? 1 / (norm * (norm + end)) : 0;
     eits_zero(more, length);
     ctx->kernels->rows_add(ctx->solver.factor, stride, count, length, scratch, more);
@@ -95,7 +95,7 @@ uint64_t eits_macs_to_finish(const eits_context *ctx, uint32_t count)
     return (uint64_t)count * ctx->model->rank + eits_gradient_macs(ctx);
 }
 
-/* Whether the limit leaves room for `macs`, S x of one more column, and the gap after it.
+/* Return 1 if the limit leaves room for `macs`, S x with one more column, and the gap after it.
  *
  * Once a step is too expensive the solve ends. Cheaper steps are not tried instead, so that the
  * result does not depend on the order of tests. */
@@ -106,13 +106,13 @@ int eits_active_affords(const eits_context *ctx, eits_active *a, uint64_t macs)
     return !a->limited;
 }
 
-/* The last active column takes the place, so that nothing has to be shifted. Uses a->work and
- * a->step. */
+/* The last active column moves to the free place, so that nothing has to be shifted. Uses a->work
+ * and a->step. */
 void eits_active_drop(eits_context *ctx, eits_active *a, uint32_t place)
 {
     const uint32_t count = ctx->solver.working_count, last = count - 1;
     if (eits_active_affords(
-            ctx, a, eits_factor_macs(count))) { /* otherwise the factor is needed no longer */
+            ctx, a, eits_factor_macs(count))) { /* otherwise the factor is no longer needed */
         ctx->info.macs += eits_factor_macs(count);
         drop_row(ctx, count, place, a->work, a->step);
     }
@@ -123,15 +123,16 @@ void eits_active_drop(eits_context *ctx, eits_active *a, uint32_t place)
     a->sign[place] = a->sign[last];
 }
 
-/* Make column j active without a row in the factor. Only if the solve ends then, or FISTA
- * continues. */
+/* Make column j active without a row in the factor. This is allowed only if the solve then ends or
+ * FISTA continues it. */
 static void activate_dependent(eits_context *ctx, uint32_t j, eits_real x)
 {
     ctx->solver.working[ctx->solver.working_count] = j;
     ctx->solver.x[ctx->solver.working_count++] = x;
 }
 
-/* The part of column j that counts into a->column; returns its square, 0 where it is but rounding.
+/* Write into a->column the part of column j that the projection leaves. Returns its square, or 0 if
+ * it is only rounding.
  */
 static eits_real read_column(eits_context *ctx, eits_active *a, uint32_t j)
 {
@@ -142,7 +143,7 @@ static eits_real read_column(eits_context *ctx, eits_active *a, uint32_t j)
         a->column[i] = scale * from[i];
     const eits_real before = eits_dot(ctx->kernels, a->column, a->column, rank);
     ctx->info.macs += rank;
-    /* Nothing is ignored and F = 1: the column counts as it is. */
+    /* No direction is projected out and F = 1: the column is used as it is. */
     if (ctx->projection.count == 0 && !ctx->whitening.form)
         return before;
     ctx->info.macs += rank + eits_forward(ctx, a->column);
@@ -151,7 +152,7 @@ static eits_real read_column(eits_context *ctx, eits_active *a, uint32_t j)
 }
 
 /* a->step = the combination of the active columns that is nearest to the new one. Returns the
- * square of the part of the new column that it does not give. */
+ * square of the rest of the new column. */
 static eits_real part_left(eits_context *ctx, eits_active *a, eits_real square)
 {
     const uint32_t count = ctx->solver.working_count;
@@ -176,15 +177,16 @@ static void activate(eits_context *ctx, eits_active *a, uint32_t j, eits_real x,
     a->pull[k] = pull;
 }
 
-/* The new column depends on the active ones (a->step as above). Move along what leaves S x as it
- * is, if that lowers the objective, until a coefficient is zero, and drop that; returns by how much
- * the new one moved, 0 where there is no such way. */
+/* The new column depends on the active ones (a->step as above). Move along the direction that
+ * leaves S x unchanged, if this lowers the objective, until a coefficient is zero, and drop that
+ * column. Returns the change of the new coefficient, or 0 if the objective cannot be lowered in
+ * this way. */
 static eits_real exchange(eits_context *ctx, eits_active *a, eits_real sign, eits_real pull)
 {
     const uint32_t count = ctx->solver.working_count;
     ctx->info.macs += count;
-    /* The objective's slope along the exchange is the pulls' sum, since S x does not change on the
-     * way. */
+    /* The objective's slope along the exchange is the sum of the pulls, because S x does not
+     * change. */
     eits_real slope = sign * pull, shortest = R(INFINITY);
     uint32_t place = count;
     for (uint32_t k = 0; k < count; ++k) {
@@ -204,12 +206,13 @@ static eits_real exchange(eits_context *ctx, eits_active *a, eits_real sign, eit
     return shortest;
 }
 
-/* Take column j in, at zero.
+/* Add column j with the coefficient zero.
  *
- * Where it depends on the active ones, or they fill all directions, one of them makes room by
- * exchange() and the test is made again: dropping a column changes what the others span. Each turn
- * drops one, so the loop ends. What the exchanges moved is kept in x; if no way on is left while x
- * is not zero, the column stays without a factor row and the solve goes on elsewhere. */
+ * If it depends on the active columns, or if these span all directions, exchange() removes one of
+ * them and the test is repeated, because the remaining columns span another space. Each turn drops
+ * one column, so the loop ends. The coefficient that the exchanges have given is kept in x. If no
+ * further exchange is possible while x is not zero, the column stays active without a factor row,
+ * and FISTA continues the solve. */
 void eits_active_add(eits_context *ctx, eits_active *a, uint32_t j)
 {
     const eits_real sign = ctx->solver.gradient[j] > 0 ? 1 : -1,
@@ -231,7 +234,7 @@ void eits_active_add(eits_context *ctx, eits_active *a, uint32_t j)
         }
         const eits_real moved = exchange(ctx, a, sign, pull);
         x += moved;
-        if (ctx->solver.working_count == count) /* no way on */
+        if (ctx->solver.working_count == count) /* no further exchange is possible */
             break;
     }
     if (x == 0)
@@ -240,8 +243,8 @@ void eits_active_add(eits_context *ctx, eits_active *a, uint32_t j)
     a->loose = 1;
 }
 
-/* From a warm start's coefficients: a factor of their columns, without those that depend on the
- * others. Returns 0, nothing changed, where the limit of MACs leaves no room for that. */
+/* Build the factor of a warm start's columns, except those that depend on the others. Returns 0,
+ * and changes nothing, if the limit of multiply-accumulates leaves no room for it. */
 int eits_active_begin_warm(eits_context *ctx, eits_active *a)
 {
     const uint64_t active_count = ctx->info.nonzeros, rank = ctx->model->rank;

@@ -40,8 +40,8 @@ static inline uint64_t eits_factor_macs(uint32_t count)
 /* Multiply-accumulates of S x with `count` columns and the gap, at the end of a solve. */
 uint64_t eits_macs_to_finish(const eits_context *ctx, uint32_t count);
 
-/* Whether mac_limit allows `macs`, S x with one more column, and the gap after it. If it does not,
- * a->limited is set, and all later calls return 0. */
+/* Return 1 if mac_limit allows `macs`, S x with one more column, and the gap after it. If it does
+ * not, a->limited is set, and all later calls return 0. */
 int eits_active_affords(const eits_context *ctx, eits_active *a, uint64_t macs);
 
 /* Drop the active column at `place`; the last one takes its place. Uses a->work and a->step. */

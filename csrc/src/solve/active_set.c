@@ -1,16 +1,16 @@
-/* Active set: the exact optimum over a few columns by Newton's step on a factor of their products,
- * which grows and shrinks with them; then those columns join whose correlation exceeds lambda and
- * is the greatest among their neighbours in the image; and again until none is missing; between two
- * looks at every column, looks beside the active ones so far (Lawson and Hanson, Solving Least
- * Squares Problems, 1974, chapter 23, with several columns at a time). Each step keeps signs and
- * lowers the objective. A column that depends on the active ones moves with them, along what leaves
- * S x as it is, until one of them is zero and makes room: the factor never has more rows than there
- * are directions.
+/* The active set method finds the exact optimum over a few columns, by Newton's step on a factor of
+ * their products. Then columns join whose correlation exceeds lambda and is the greatest among
+ * their neighbours in the image. This repeats until no column is missing. Between two looks at
+ * every column, the method looks only at the neighbours of columns that have been active (Lawson
+ * and Hanson, Solving Least Squares Problems, 1974, chapter 23, with several columns at a time).
+ * Each step keeps signs and lowers the objective. A column that depends on the active ones moves
+ * together with them, along the direction that leaves S x unchanged, until one of them is zero and
+ * is dropped. So the factor never has more rows than there are directions.
  *
- * Why beside FISTA: FISTA approaches the optimum, this ends at it, and tells so
- * (EITS_STOP_OPTIMUM). With the few columns of a sparse optimum the steps are cheap; what costs is
- * the look at every column once a round, n_pixels x rank multiply-accumulates. Hence the looks
- * nearby, which see only columns beside the active ones, and rounds that take in several columns at
+ * Why it exists beside FISTA: FISTA approaches the optimum; this method ends at it and reports that
+ * (EITS_STOP_OPTIMUM). With the few columns of a sparse optimum the steps are cheap; the look at
+ * every column, once per round, is expensive: n_pixels x rank multiply-accumulates. Therefore there
+ * are looks at the neighbours of the active columns alone, and rounds that add several columns at
  * once.
  *
  * On the active columns A with signs g the objective is a parabola, with the optimum at
@@ -30,10 +30,10 @@
 #include "solve/constants.h"
 #include "solve/solve.h"
 
-/* How far coefficient k can go of its step: 2 where it keeps its sign to the end.
+/* Return the fraction of its step that coefficient k can go; 2 if it keeps its sign to the end.
  *
- * A coefficient that would change sign stops at zero: beyond it lambda |x| has another slope,
- * and the step is not the optimum any more. */
+ * A coefficient that would change its sign stops at zero: beyond zero lambda |x| has another slope,
+ * and the step no longer leads to the optimum. */
 static eits_real reach(const eits_context *ctx, const eits_active *a, uint32_t k)
 {
     const eits_real x = ctx->solver.x[k], target = x + a->step[k];
@@ -42,10 +42,10 @@ static eits_real reach(const eits_context *ctx, const eits_active *a, uint32_t k
     return x == 0 ? 0 : -x / a->step[k];
 }
 
-/* Newton's step to the optimum of the active columns, again and again without those that would
- * change sign. All coefficients go the same fraction of their steps, that of the first one to reach
- * zero: along the step the objective falls all the way, coefficient by coefficient it need not.
- * Each turn drops a column or ends. */
+/* Make Newton's step to the optimum of the active columns, and repeat it without the columns that
+ * would change sign. All coefficients go the same fraction of their steps: that of the first one
+ * which reaches zero. The objective falls all along this step; if coefficients moved separately, it
+ * might not. Each turn drops a column or ends. */
 static void settle(eits_context *ctx, eits_active *a)
 {
     while (ctx->solver.working_count > 0) {
@@ -70,7 +70,8 @@ static void settle(eits_context *ctx, eits_active *a)
         a->moved = a->moved || fraction > 0;
         uint32_t dropped = 0;
         for (uint32_t k = count; k-- > 0;) {
-            if (a->reach[k] <= fraction) { /* the last, which takes the place, is not among them */
+            if (a->reach[k] <= fraction) { /* the last column, which moves to this place, does not
+                                              end its step here */
                 eits_active_drop(ctx, a, k);
                 ++dropped;
             }
@@ -80,8 +81,8 @@ static void settle(eits_context *ctx, eits_active *a)
     }
 }
 
-/* The pull of the active columns, from solver.gradient, which is zero for them afterwards;
- * returns the greatest. */
+/* Take the pulls of the active columns from solver.gradient, and set it to zero for them. Returns
+ * the greatest pull. */
 static eits_real take_pulls(eits_context *ctx, eits_active *a)
 {
     eits_real greatest = 0;
@@ -112,11 +113,10 @@ static void start_over_from_zero(eits_context *ctx)
     eits_zero(ctx->solver.sx, EITS_STRIDE(ctx->model->rank));
 }
 
-/* Take in the first `missing` columns listed, and step to the optimum with them. Returns whether
- * anything moved.
+/* Add the first `missing` columns of the list, and step to the optimum with them. Returns 1 if any
+ * coefficient changed.
  *
- * A column that comes in loosely ends the round: the factor does not have it, so no step may be
- * based on it. */
+ * A column that has no row in the factor ends the round, because no step may be based on it. */
 static int take_in(eits_context *ctx, const eits_scratch *scratch, eits_active *a, uint32_t missing)
 {
     a->moved = 0;
@@ -127,8 +127,8 @@ static int take_in(eits_context *ctx, const eits_scratch *scratch, eits_active *
     return a->moved;
 }
 
-/* What joins next is mostly beside what is or was active: look there only. *objective is the last
- * one known. Returns whether anything moved. */
+/* The next columns to join are mostly neighbours of columns that are or were active, so look only
+ * there. *objective is the last known objective. Returns 1 if any coefficient changed. */
 static int look_nearby(eits_context *ctx, const eits_scratch *scratch, eits_active *a,
                        eits_real *objective)
 {
@@ -158,7 +158,7 @@ static int look_nearby(eits_context *ctx, const eits_scratch *scratch, eits_acti
     return missing > 0 && take_in(ctx, scratch, a, missing);
 }
 
-/* One round; *c becomes the duality gap after it. */
+/* Make one round; *c becomes the duality gap after it. */
 static int round_of(eits_context *ctx, const eits_scratch *scratch, eits_active *a,
                     uint32_t missing, eits_duality_gap *c)
 {
@@ -175,9 +175,10 @@ static int round_of(eits_context *ctx, const eits_scratch *scratch, eits_active 
 
 /* Rounds until something ends them. Returns 0 if the factor failed and FISTA has to continue.
  *
- * At the level of rounding the objective no longer falls though columns still seem to violate. The
- * first such round is repeated with the worst column alone, since several at once may undo each
- * other; after the second this is the optimum as well as these numbers can have it. */
+ * At the level of rounding the objective no longer falls, although columns still seem to violate
+ * the conditions. The first such round is repeated with the worst column alone, because several at
+ * once may undo each other. After the second one, the result is the optimum within the precision of
+ * the numbers. */
 static int rounds(eits_context *ctx, const eits_scratch *scratch, eits_active *a,
                   eits_duality_gap *c)
 {
@@ -229,7 +230,7 @@ void eits_run_active_set(eits_context *ctx, const eits_scratch *scratch, eits_re
     a.reach = ctx->solver.x_next, a.column = ctx->solver.sx_next;
     a.near = eits_nearby_none(ctx);
     eits_duality_gap c;
-    /* the set changes column by column here: unpacked copies would be stale at once */
+    /* the set changes column by column, so unpacked copies would be out of date at once */
     ctx->solver.working_count = ctx->solver.working_cached = 0;
     if (gradient_known) {
         eits_copy(ctx->solver.residual, ctx->frame.y, EITS_STRIDE(ctx->model->rank));
@@ -254,7 +255,7 @@ void eits_run_active_set(eits_context *ctx, const eits_scratch *scratch, eits_re
         eits_report_duality_gap(ctx, c);
         return;
     }
-    /* FISTA's first gradient, and the gap after it. */
+    /* This is the cost of FISTA's first gradient, and of the gap after it. */
     const int affordable = eits_affords(ctx, 2 * eits_gradient_macs(ctx));
     if (affordable && ctx->info.iterations < ctx->options.iterations) {
         eits_run_fista(ctx, scratch, lambda, 0);

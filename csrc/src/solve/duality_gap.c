@@ -1,13 +1,13 @@
 /* The duality gap, the gradient that it needs, and the limit of multiply-accumulates.
  *
- * The gap is an upper bound of how far the objective is above its optimum, whatever solver made x:
- * what a caller can rely on without trusting the solver. It needs the gradient of every column,
- * n_pixels x rank multiply-accumulates, which is the larger part of an iteration on a working set;
- * so the solvers ask for it seldom. What is written here is shared by all of them, so that gap,
- * objective and limit mean the same whichever ran.
+ * The gap is an upper bound of the distance of the objective from its optimum. It holds for any x,
+ * so a caller can rely on it without trusting the solver. It needs the gradient of every column,
+ * n_pixels x rank multiply-accumulates, which is more than half of an iteration on a working set;
+ * the solvers therefore compute it rarely. All solvers share this file, so that gap, objective and
+ * limit mean the same for each.
  *
- * Everything is relative to |y|^2 / 2, the objective at x = 0: gap_rel = 0.01 says that the
- * objective is within a hundredth of what explaining nothing would cost. */
+ * All numbers are relative to |y|^2 / 2, the objective at x = 0: with gap_rel = 0.01 the objective
+ * is within a hundredth of that value of its optimum. */
 #include "solve/constants.h"
 #include "solve/solve.h"
 
@@ -22,8 +22,8 @@ uint64_t eits_take_residual(eits_context *ctx, const eits_real *sx)
     return eits_residual(ctx, sx, ctx->solver.residual);
 }
 
-/* Counted in advance as well, so that a step is not begun which the limit would leave without
- * its gap. */
+/* The cost is also counted in advance, so that no step begins after which the limit would not allow
+ * the gap. */
 uint64_t eits_gradient_macs(const eits_context *ctx)
 {
     return (uint64_t)ctx->model->n_pixels * ctx->model->rank + eits_forward_macs(ctx) +
@@ -48,8 +48,8 @@ static eits_real half_square_of_data(const eits_context *ctx)
     return R(0.5) * ctx->info.data_norm * ctx->info.data_norm;
 }
 
-/* Rounding may lift the objective a little; a thousandth of its value at zero is far above
- * rounding and far below what a step too long does. */
+/* Rounding may raise the objective slightly. A thousandth of its value at zero is far above
+ * rounding, and far below the rise by a step that is too long. */
 eits_real eits_ceiling(const eits_context *ctx)
 {
     return half_square_of_data(ctx) * (1 + EITS_MAX_RISE);
@@ -72,8 +72,8 @@ eits_duality_gap eits_duality_gap_of(const eits_context *ctx, eits_real lambda, 
         const uint32_t j = layout == EITS_LAYOUT_WORKING ? ctx->solver.working[k] : k;
         const eits_real weight = lambda * eits_fabs(ctx->solver.x[k]);
         const eits_real slack = eits_fma(-s * ctx->solver.x[k], ctx->solver.gradient[j], weight);
-        /* By lanes of the column's number, not of its place in the list: the sum then has the same
-         * bits in either layout. */
+        /* The lane follows from the column's number, not from its place in the list, so that the
+         * sum has the same bits in both layouts. */
         lane[j % 8] += slack > 0 ? slack : 0; /* below zero by rounding only */
         lane_l1[j % 8] += weight;
     }
@@ -91,7 +91,7 @@ eits_duality_gap eits_find_duality_gap(eits_context *ctx, eits_real lambda, eits
     return eits_duality_gap_of(ctx, lambda, layout);
 }
 
-/* There r = y and the sum over coefficients is empty. */
+/* At x = 0, r = y, and the sum over coefficients is empty. */
 eits_duality_gap eits_duality_gap_at_zero(const eits_context *ctx, eits_real lambda)
 {
     const eits_real half = half_square_of_data(ctx),

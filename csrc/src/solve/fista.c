@@ -5,23 +5,24 @@
  *     t'   = (1 + sqrt(1 + 4 t^2)) / 2,  beta = (t - 1) / t'
  *     z'   = x' + beta (x' - x)
  *
- * L is the model's Lipschitz constant, found once when the model is built, so no line search runs
- * on the board. The whitening of the model makes it a good step in every direction.
+ * L is the model's Lipschitz constant. It is computed once when the model is built, so that no line
+ * search runs on the board. Because the model is whitened, the step 1 / L is good in every
+ * direction.
  *
  * An iteration costs one product with S' (every column, or the working set) and one with S (the
  * non-zeros alone), n_pixels x rank and nonzeros x rank multiply-accumulates. S z is extrapolated
- * from S x as z is from x. F S x is subtracted from y each time, not updated: a residual kept by
- * updates gathers rounding, and this one does not.
+ * from S x as z is from x. F S x is subtracted from y each time: a residual that is updated instead
+ * accumulates rounding errors.
  *
- * L may be too small all the same: a model from elsewhere, or one whose S was rounded to few bits.
- * Then the iteration diverges. A cheap test of |S x| sees that, the gap confirms it, and the solve
- * starts again from zero with half the step, at most eight times, after which
+ * L may still be too small, in a model from another program or one whose S was rounded to few bits.
+ * Then the iteration diverges. A cheap test of |S x| detects that, and the gap confirms it. The
+ * solve then starts again from zero with half the step, at most eight times; after that,
  * EITS_STOP_DIVERGED reports a useless model.
  *
- * Invariants: sx = S x and sz = S z at the head of each iteration; x, x_next and sx, sx_next swap
- * pointers instead of contents (bring_home undoes it). With a working set all vectors by pixel are
- * lists over it; otherwise both modes run this same text, and give the same bits where the set is
- * chosen in every iteration. */
+ * Invariants: at the start of each iteration sx = S x and sz = S z. x and x_next, and sx and
+ * sx_next, swap pointers instead of contents (bring_home undoes it). With a working set, all
+ * vectors by pixel are lists over it. Otherwise both modes run the same code, and they give the
+ * same bits if the set is chosen in every iteration. */
 #include "base/vec.h"
 #include "context/products.h"
 #include "frame/whitening.h"
@@ -34,13 +35,14 @@ static int by_working_set(const eits_context *ctx)
     return ctx->options.solver == EITS_SOLVER_WORKING_SET;
 }
 
-/* How many coefficients x, x_next and z hold. */
+/* Return the number of coefficients in x, x_next and z. */
 static uint32_t working_size(const eits_context *ctx)
 {
     return by_working_set(ctx) ? ctx->solver.working_count : ctx->model->n_pixels;
 }
 
-/* The working set's part of eits_take_gradient; the same residual, fewer columns. */
+/* Compute the gradient of the working set's columns alone; the residual is that of
+ * eits_take_gradient. */
 static void take_working_gradient(eits_context *ctx, const eits_real *sx)
 {
     ctx->info.macs += eits_take_residual(ctx, sx);
@@ -50,15 +52,15 @@ static void take_working_gradient(eits_context *ctx, const eits_real *sx)
         (uint64_t)ctx->solver.working_count * ctx->model->rank + eits_adjoint_macs(ctx);
 }
 
-/* The extrapolated point starts at x, momentum forgotten. */
+/* Start the extrapolated point at x, without momentum. */
 static void restart_momentum(eits_context *ctx)
 {
     eits_copy(ctx->solver.z, ctx->solver.x, working_size(ctx));
     eits_copy(ctx->solver.sz, ctx->solver.sx, EITS_STRIDE(ctx->model->rank));
 }
 
-/* After a step that was too long the last x may be anywhere, infinite even; zero is the only
- * point known to be good. */
+/* After a step that was too long, the last x may be any point, even infinite. Zero is the only
+ * point that is known to be good. */
 static void start_over_from_zero(eits_context *ctx)
 {
     ctx->solver.working_count = 0;
@@ -75,7 +77,7 @@ static void swap(eits_real **a, eits_real **b)
     *b = kept;
 }
 
-/* Whether the limit of MACs leaves room for S x_next, and the gap after it. */
+/* Return 1 if the limit of multiply-accumulates leaves room for S x_next and the gap after it. */
 static int affords_product(const eits_context *ctx)
 {
     if (ctx->options.mac_limit == 0)
@@ -86,9 +88,9 @@ static int affords_product(const eits_context *ctx)
     return eits_affords(ctx, count * ctx->model->rank + eits_gradient_macs(ctx));
 }
 
-/* One iteration from z with the given step, solver.gradient being that at z; *t is the
- * momentum number. 0 where the limit of multiply-accumulates allows it no longer; x is as it was
- * then. */
+/* Make one iteration from z with the given step; solver.gradient is the gradient at z, and *t is
+ * the momentum number t. Returns 0 if the limit of multiply-accumulates does not allow it; x is
+ * then unchanged. */
 static int iterate(eits_context *ctx, const eits_scratch *scratch, eits_real lambda, eits_real step,
                    eits_real *t)
 {
@@ -105,7 +107,7 @@ static int iterate(eits_context *ctx, const eits_scratch *scratch, eits_real lam
             ? eits_apply_working(ctx, scratch, ctx->solver.x_next, ctx->solver.sx_next)
             : eits_apply(ctx, scratch, ctx->solver.x_next, ctx->solver.sx_next);
     ctx->info.macs += (uint64_t)ctx->info.nonzeros * ctx->model->rank;
-    /* S z from S x as z from x: linear, and it saves a product. */
+    /* S z follows from S x as z follows from x, because S is linear. This saves a product. */
     ctx->kernels->extrapolate(ctx->solver.sz, beta, ctx->solver.sx_next, ctx->solver.sx,
                               EITS_STRIDE(ctx->model->rank));
     swap(&ctx->solver.x, &ctx->solver.x_next);
@@ -114,10 +116,10 @@ static int iterate(eits_context *ctx, const eits_scratch *scratch, eits_real lam
     return 1;
 }
 
-/* When the working set is looked after: a look at every column after gap_every iterations, then
- * after EITS_LOOK_GROWTH times as many, and so on: early looks matter, later ones change little;
- * where a gap is to be reached, always after gap_every. In between, columns at rest are left out
- * every few iterations. */
+/* When the working set is updated. The first look at every column comes after gap_every iterations,
+ * the next after EITS_LOOK_GROWTH times as many, and so on, because early looks matter most. If a
+ * gap is to be reached, each look comes after gap_every iterations. In between, columns at rest are
+ * left out every few iterations. */
 typedef struct schedule {
     uint32_t next_look, interval;
 } schedule;
@@ -127,7 +129,8 @@ static int looks_at_every_column(const eits_context *ctx, uint32_t k, const sche
     return !by_working_set(ctx) || k >= s->next_look;
 }
 
-/* Whether the limit of MACs leaves room for the gradient of iteration k, and the gap after it. */
+/* Return 1 if the limit of multiply-accumulates leaves room for the gradient of iteration k and the
+ * gap after it. */
 static int affords_gradient(const eits_context *ctx, uint32_t k, const schedule *s)
 {
     const uint64_t total = eits_gradient_macs(ctx);
@@ -136,7 +139,7 @@ static int affords_gradient(const eits_context *ctx, uint32_t k, const schedule 
     return eits_affords(ctx, total + (looks_at_every_column(ctx, k, s) ? total : some));
 }
 
-/* The gradient at z for iteration k (from 1): of every column, or of the working set as it is then.
+/* Compute the gradient at z for iteration k (from 1): of every column, or of the working set.
  */
 static void prepare_gradient(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
                              uint32_t k, schedule *s, int known)
@@ -158,11 +161,12 @@ static void prepare_gradient(eits_context *ctx, const eits_scratch *scratch, eit
         eits_working_set_prune(ctx, lambda);
 }
 
-/* The loop and its four ends: count, gap, multiply-accumulates, divergence.
+/* Iterate until one of four ends: the number of iterations, the gap, the multiply-accumulates, or
+ * divergence.
  *
- * The limit of multiply-accumulates is tested before each product, with what the gap at the end
- * costs put by, so a solve that it cuts short still knows its gap. Where the limit is reached the
- * last complete x stands. */
+ * The limit of multiply-accumulates is checked before each product, and the cost of the gap at the
+ * end is reserved, so a solve that is cut short still has its gap. If the limit is reached, the
+ * last complete x is the result. */
 static void iterate_to_the_end(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
                                int gradient_known)
 {
@@ -192,17 +196,18 @@ static void iterate_to_the_end(eits_context *ctx, const eits_scratch *scratch, e
         gap_known = 0;
         if (k != o->iterations && k % o->gap_every != 0)
             continue;
-        /* The gap costs a whole gradient: it is found at the end, where one is asked for, and where
-         * |S x| says that the objective may have risen. */
+        /* The gap costs a whole gradient. It is computed at the end, at the interval of
+         * options.gap_every if a gap is asked for, and when |S x| shows that the objective may have
+         * risen. */
         const int none = ctx->info.nonzeros == 0;
         if (k != o->iterations && !(o->gap_rel > 0) && !none &&
             eits_dot(ctx->kernels, ctx->solver.sx, ctx->solver.sx, ctx->model->rank) <=
                 4 * 2 * scale)
-            continue; /* |Sx| <= 2 |y| wherever the objective is below its value at zero */
+            continue; /* if the objective is below its value at zero, then |S x| <= 2 |y| */
         c = eits_find_duality_gap(ctx, lambda, layout);
         gap_known = 1;
-        /* too long a step may also throw all coefficients beyond their sign, to zero: then the gap
-         * is that of the start */
+        /* a step that is too long may also drive all coefficients beyond their sign, to zero; then
+         * the gap is that of the start */
         if (!(c.objective <= ceiling) || (none && c.gap > EITS_MAX_RISE * scale)) {
             if (ctx->info.step_halvings == EITS_MAX_STEP_HALVINGS || k == o->iterations) {
                 ctx->info.stop = EITS_STOP_DIVERGED;
@@ -212,8 +217,8 @@ static void iterate_to_the_end(eits_context *ctx, const eits_scratch *scratch, e
             step *= R(0.5);
             t = 1;
             start_over_from_zero(ctx);
-            /* With the shorter step all begins again, the schedule included; iterations spent stay
-             * spent. */
+            /* With the shorter step everything begins again, including the schedule; only the count
+             * of iterations continues. */
             looks = (schedule){.next_look = k + 1, .interval = o->gap_every};
             c = eits_duality_gap_at_zero(ctx, lambda);
             continue;
@@ -233,7 +238,8 @@ static void iterate_to_the_end(eits_context *ctx, const eits_scratch *scratch, e
     eits_report_duality_gap(ctx, c);
 }
 
-/* x and x_next have changed places with each iteration; but x_next is only lent. */
+/* x and x_next were swapped in each iteration. Copy x back if it is in x_next, which is only
+ * borrowed. */
 static void bring_home(eits_context *ctx, eits_real *home)
 {
     if (ctx->solver.x == home)
@@ -245,7 +251,7 @@ static void bring_home(eits_context *ctx, eits_real *home)
 void eits_run_fista(eits_context *ctx, const eits_scratch *scratch, eits_real lambda,
                     int gradient_known)
 {
-    /* x outlives the solve where it was laid out. */
+    /* x must be in its own memory after the solve. */
     eits_real *const home = ctx->solver.x;
     ctx->solver.working_count = 0;
     if (by_working_set(ctx) && !gradient_known) /* a warm start */

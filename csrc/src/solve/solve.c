@@ -1,11 +1,11 @@
 /* One frame's solve: lambda, detection threshold, start, image; the solvers iterate.
  *
- * The problem is the lasso in reduced data: minimise |y - Q F S x|^2 / 2 + lambda |x|_1, with
- * x >= 0, x <= 0 or free as options.sign says (S, Q, F: docs/reference/eitm-format.md and
- * frame/whitening.h). What does not depend on the solver is decided here, in this order, each step
- * ending the frame where it can:
+ * The problem is the lasso in reduced data: minimise |y - Q F S x|^2 / 2 + lambda |x|_1, with x >=
+ * 0, x <= 0 or free as options.sign says (S, Q, F: docs/reference/eitm-format.md and
+ * frame/whitening.h). This file does what does not depend on the solver, in this order; each step
+ * may end the frame:
  *
- *   1. S'y, n_pixels x rank multiply-accumulates. Its greatest, lambda_max, is the least lambda at
+ *   1. S'y, n_pixels x rank multiply-accumulates. Its maximum, lambda_max, is the least lambda at
  *      which x = 0 is optimal.
  *   2. lambda = the greater of lambda_rel lambda_max and lambda_noise_factor lambda_noise. The
  *      first scales with the touch, so that the image's shape does not depend on its strength;
@@ -52,19 +52,18 @@ void eits_answer_zero(eits_context *ctx, eits_stop why)
     ctx->info.residual = ctx->info.data_norm;
 }
 
-/* x is kept in coefficients for a warm start; only the image is in S/m. */
+/* x stays in coefficients, for a warm start; only the image is in S/m. */
 static void make_image(eits_context *ctx)
 {
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
         ctx->solver.image[j] = ctx->solver.x[j] * (eits_real)ctx->model->column_weight[j];
 }
 
-/* Take up the last frame's coefficients, unless zero is the better start for this one. The sum S x
- * belongs to an earlier frame's numbers too, but is computed again: it costs little, and rounding
- * cannot gather over a million frames.
+/* Start from the last frame's coefficients, unless zero is the better start for this frame. S x is
+ * computed again: this costs little, and rounding errors cannot accumulate over a million frames.
  *
- * Zero is the better start where the skin was let go: the old coefficients would have to be
- * taken back one iteration after another. */
+ * Zero is the better start if the skin was released: the old coefficients would have to be reduced
+ * in many iterations. */
 static int warm_start(eits_context *ctx, const eits_scratch *scratch)
 {
     uint32_t count = 0;
@@ -77,7 +76,7 @@ static int warm_start(eits_context *ctx, const eits_scratch *scratch)
     eits_real l1 = 0;
     for (uint32_t j = 0; j < ctx->model->n_pixels; ++j)
         l1 += eits_fabs(ctx->solver.x[j]);
-    /* Twice the objective at the old x, against twice that at zero, |y|^2. */
+    /* Compare twice the objective at the old x with twice that at zero, |y|^2. */
     const eits_real twice = eits_fma(
         2 * ctx->info.lambda, l1,
         eits_dot(ctx->kernels, ctx->solver.residual, ctx->solver.residual, ctx->model->rank));
@@ -98,11 +97,10 @@ static void run(eits_context *ctx, const eits_scratch *scratch, int gradient_kno
     }
 }
 
-/* info holds what the frame stage counted, and zeros; `from_last`: start from the last
- * coefficients.
+/* info has the frame stage's counts, and zeros. `from_last`: 1 to start from the last coefficients.
  *
- * Whichever way it returns, x, image and info agree and are finite. If there is no image, it is
- * zero and info.stop has the reason. */
+ * However it ends, x, image and info agree and are finite. If there is no image, it is zero and
+ * info.stop has the reason. */
 eits_status eits_solve_frame(eits_context *ctx, const eits_scratch *scratch, int from_last)
 {
     const eits_options *o = &ctx->options;
@@ -115,8 +113,8 @@ eits_status eits_solve_frame(eits_context *ctx, const eits_scratch *scratch, int
         eits_answer_zero(ctx, EITS_STOP_MACS);
         return EITS_OK;
     }
-    /* S'y at once: its greatest gives lambda_max, by which everything else is decided, and it is
-     * the gradient at zero, from which a cold start begins. */
+    /* S'y comes first: its maximum is lambda_max, on which all following decisions depend, and it
+     * is the gradient at zero, where a cold start begins. */
     eits_apply_t(ctx, eits_adjoint(ctx, ctx->frame.y, ctx->solver.adjoint), ctx->solver.gradient);
     ctx->info.macs += (uint64_t)ctx->model->n_pixels * rank + eits_adjoint_macs(ctx);
     ctx->info.lambda_max =
@@ -133,13 +131,13 @@ eits_status eits_solve_frame(eits_context *ctx, const eits_scratch *scratch, int
         eits_answer_zero(ctx, EITS_STOP_BELOW_THRESHOLD);
         return EITS_OK;
     }
-    /* Zero is the exact optimum where no correlation exceeds lambda (the KKT conditions at x = 0).
+    /* If no correlation exceeds lambda, zero is the exact optimum (the KKT conditions at x = 0).
      */
     if (!(ctx->info.lambda_max > ctx->info.lambda) || square < EITS_MIN_SQUARE) {
         eits_answer_zero(ctx, EITS_STOP_ZERO);
         return EITS_OK;
     }
-    /* A warm start needs its own gradient; a cold one has it. */
+    /* A warm start needs its own gradient; for a cold start it is known. */
     const int warm = from_last && ctx->solver.warm && warm_start(ctx, scratch);
     if (!warm) {
         start_from_zero(ctx);

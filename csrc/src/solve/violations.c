@@ -1,11 +1,11 @@
-/* The KKT conditions' violations: which columns at zero would lower the objective.
+/* Find the violations of the KKT conditions: columns at zero that would lower the objective.
  *
  * With r the residual, the optimum of |y - F S x|^2 / 2 + lambda |x|_1 has s_j'r = lambda sign(x_j)
  * where x_j is not zero, and |s_j'r| <= lambda where it is (one-sided under a sign rule). The
- * active set solver asks after each round which columns break the second condition. It wants a few
- * good ones, not all: neighbouring pixels have nearly parallel columns, so where one is missing its
- * neighbours violate too, and most of them no longer do once it is in. Hence only local maxima over
- * the eight neighbours in the image are listed.
+ * active set solver asks after each round which columns break the second condition. It needs a few
+ * good columns, not all. Neighbouring pixels have nearly parallel columns, so if one is missing,
+ * its neighbours violate the condition, too, and most of them no longer do after it has been added.
+ * Therefore only local maxima over the eight neighbours in the image are listed.
  *
  * In: solver.gradient = S'F'r, with the active columns' set to zero; the image's grid. Out: columns
  * in scratch->index, greatest violation first, ties by the lower number. That order is part of the
@@ -13,7 +13,7 @@
  *
  * A look at every column costs n_pixels x rank multiply-accumulates and dominates a round. Between
  * two of them the solver looks at the active columns' neighbours alone (eits_nearby): touches are
- * blobs, so what joins is mostly beside what is there. */
+ * connected, so most columns that join are neighbours of active ones. */
 #include "solve/violations.h"
 
 #include "base/vec.h"
@@ -21,8 +21,8 @@
 #include "kernels/kernels.h"
 #include "solve/constants.h"
 
-/* The correlations, signed so that more is a greater violation. Where the sign rule allows
- * increases alone they are so already, and no copy is made. */
+/* Return the correlations with a sign such that a greater number is a greater violation. If the
+ * sign rule allows only increases, they have it already, and no copy is made. */
 static const eits_real *violation(const eits_context *ctx, const eits_scratch *scratch)
 {
     const eits_real *g = ctx->solver.gradient;
@@ -43,10 +43,10 @@ static const eits_real *violation(const eits_context *ctx, const eits_scratch *s
     return out;
 }
 
-/* No branch within the loop: whether a neighbour is greater is a coin's toss, which a processor
- * guesses wrong half of the time. At the image's edge, and where a neighbour is no kept pixel, the
- * pixel is compared with itself or with one that it is compared with anyhow, which changes nothing.
- * Of equals the lowest number is the peak, so that a plateau has exactly one. */
+/* The loop has no branch, because a processor would mispredict half of these comparisons. At the
+ * image's edge, and if a neighbour is not a kept pixel, the pixel is compared with itself or with
+ * another neighbour, which changes nothing. Among equal pixels the one with the lowest number is
+ * the peak, so that a plateau has exactly one. */
 int eits_is_peak(const eits_context *ctx, const eits_real *v, uint32_t j)
 {
     const uint32_t nx = ctx->model->nx, ix = ctx->model->pixel[j].ix, iy = ctx->model->pixel[j].iy;
@@ -66,8 +66,8 @@ int eits_is_peak(const eits_context *ctx, const eits_real *v, uint32_t j)
     return !beaten;
 }
 
-/* Put column j, if it is a peak, into the list of `count`, greatest first; returns how many there
- * are then. */
+/* If column j is a peak, insert it into the list of `count` columns, greatest first. Returns the
+ * new length of the list. */
 static uint32_t consider(const eits_context *ctx, const eits_scratch *scratch, const eits_real *v,
                          uint32_t j, uint32_t count)
 {
@@ -80,7 +80,7 @@ static uint32_t consider(const eits_context *ctx, const eits_scratch *scratch, c
     return count + 1;
 }
 
-/* Pixel j's two coordinates as one number: a neighbour in the row differs by one's. */
+/* Return a pixel's two coordinates as one number. It differs by 1 between neighbours in a row. */
 static inline uint32_t place_of(const eits_pixel *pixel)
 {
     uint32_t place;
@@ -88,10 +88,10 @@ static inline uint32_t place_of(const eits_pixel *pixel)
     return place;
 }
 
-/* Of EITS_SIEVE_BLOCK columns from v and p on, which exceed `min` and are no less than their
- * neighbours in the row; returns whether any is. A cheap sieve before eits_is_peak, which looks at
- * all eight neighbours through the cell map. The columns before and after the block must exist.
- * Without a branch, so that compilers make vectors of it. */
+/* Flag those of the EITS_SIEVE_BLOCK columns from v and p on that exceed `min` and are not less
+ * than their neighbours in the row. Returns 1 if there is any. This is a cheap test before
+ * eits_is_peak, which looks at all eight neighbours through the cell map. The columns before and
+ * after the block must exist. The loop has no branch, so that compilers can vectorise it. */
 static uint32_t peaks_of_rows(const eits_real *v, const eits_pixel *p, eits_real min,
                               uint32_t flag[EITS_SIEVE_BLOCK])
 {
@@ -112,7 +112,8 @@ static uint32_t peaks_of_rows(const eits_real *v, const eits_pixel *p, eits_real
     return any;
 }
 
-/* The first and the last block have no column before or after them: those are tested one by one. */
+/* The first and the last columns have no column before or after them, so they are tested one by
+ * one. */
 static uint32_t of_all(const eits_context *ctx, const eits_scratch *scratch, const eits_real *v,
                        eits_real min)
 {
@@ -134,13 +135,13 @@ static uint32_t of_all(const eits_context *ctx, const eits_scratch *scratch, con
 uint32_t eits_list_violations(const eits_context *ctx, const eits_scratch *scratch, eits_real min,
                               const eits_nearby *near)
 {
-    /* Peaks only: neighbours of a column that is missing exceed lambda as well, and most of them no
-     * longer do once it is in. */
+    /* Only peaks are listed: the neighbours of a missing column exceed lambda as well, and most of
+     * them no longer do after it has been added. */
     const eits_real *v = violation(ctx, scratch);
     if (near == NULL)
         return of_all(ctx, scratch, v, min);
     uint32_t above = 0, count = 0, *list = scratch->index;
-    for (uint32_t k = 0; k < near->count; ++k) { /* no branch that would be guessed wrong */
+    for (uint32_t k = 0; k < near->count; ++k) { /* no branch, which would often be mispredicted */
         list[above] = near->column[k];
         above += v[near->column[k]] > min;
     }
@@ -149,8 +150,8 @@ uint32_t eits_list_violations(const eits_context *ctx, const eits_scratch *scrat
     return count;
 }
 
-/* The image is made after the solve and the active set has no use for z, so both can lend their
- * memory. */
+/* The image is computed after the solve, and the active set method does not use z, so their memory
+ * is free. */
 eits_nearby eits_nearby_none(const eits_context *ctx)
 {
     const eits_nearby near = {.column = (uint32_t *)(void *)ctx->solver.image,
@@ -159,7 +160,7 @@ eits_nearby eits_nearby_none(const eits_context *ctx)
     return near;
 }
 
-/* In near.marked: this column's neighbours are all listed. */
+/* A mark in near.marked: all neighbours of this column are listed. */
 enum { AROUND = 2 };
 
 static void add_around(const eits_context *ctx, eits_nearby *near, uint32_t j)
@@ -179,8 +180,8 @@ static void add_around(const eits_context *ctx, eits_nearby *near, uint32_t j)
     near->marked[j] = AROUND;
 }
 
-/* A column is looked around once: the mark remembers, so that a set which grows by one costs
- * nine looks and not a walk over all. */
+/* The mark makes sure that the neighbours of a column are listed only once: if the set grows by one
+ * column, nine pixels are examined and not all. */
 void eits_nearby_add(const eits_context *ctx, eits_nearby *near)
 {
     for (uint32_t k = 0; k < ctx->solver.working_count; ++k) {
@@ -189,8 +190,7 @@ void eits_nearby_add(const eits_context *ctx, eits_nearby *near)
     }
 }
 
-/* A few columns instead of all of them: the gap is not known from it, so the solve cannot end by
- * it. */
+/* The gradient of a few columns does not give the gap, so the solve cannot end by it. */
 void eits_take_gradient_nearby(eits_context *ctx, const eits_scratch *scratch,
                                const eits_nearby *near)
 {

@@ -1,26 +1,27 @@
-/* FISTA's working set. An iteration moves few coefficients: those that are not zero, in x or in the
+/* FISTA's working set. An iteration moves few coefficients: those that are not zero in x or in the
  * extrapolated point z, and those whose correlation with the residual exceeds lambda. All others
- * stay zero, so between two looks at every column the products run over these alone, and over fewer
- * and fewer of them as they come to rest at zero. A column that would have moved meanwhile does so
- * after the next look; with a look in every iteration the bits are those of FISTA on every column.
+ * stay zero. Between two looks at every column the products therefore run over these columns only,
+ * and over fewer of them as more come to rest at zero. A column that would have moved in the
+ * meantime moves after the next look. With a look in every iteration the bits are those of FISTA on
+ * every column.
  *
- * What it saves: a product over all columns costs n_pixels x rank multiply-accumulates, and a touch
- * or two moves some per cent of the columns. What it risks: a column is late by up to one interval
- * between looks. Nothing is lost for good, since a look is exact.
+ * The benefit: a product over all columns costs n_pixels x rank multiply-accumulates, but one or
+ * two touches move only some per cent of the columns. The risk: a column joins up to one interval
+ * between looks too late. No column is lost for good, because a look is exact.
  *
  * Invariants while a set is in force: working[] ascends, so that lists and sums have the order of
  * the full problem; x[k], z[k] and gradient[k] belong to column working[k]; every column outside is
- * zero in x and in z. Begin and end convert from and to the layout by pixel. */
+ * zero in x and in z. eits_working_set_begin and _end convert from and to the layout by pixel. */
 #include "solve/solve.h"
 
 #include "base/vec.h"
 #include "kernels/kernels.h"
 
-/* A column at rest moves where its gradient lies outside these.
+/* A column at rest moves if its gradient is outside these limits.
  *
- * The rule for joining is the proximal step itself: a column at x = z = 0 stays zero exactly where
- * its gradient is within lambda on each side that the sign rule allows. A side that is not allowed
- * has an infinite limit, so one pair of comparisons serves all three rules. */
+ * The rule for joining is the proximal step itself: a column at x = z = 0 stays zero exactly if its
+ * gradient is within lambda on each side that the sign rule allows. A side that is not allowed has
+ * an infinite limit, so one pair of comparisons serves all three rules. */
 typedef struct limits {
     eits_real low, high;
 } limits;
@@ -42,7 +43,7 @@ int eits_moves(eits_real gradient, eits_real lambda, eits_sign sign)
     return moves(gradient, limits_for(lambda, sign));
 }
 
-/* A warm start: what was not zero is where to go on; everything else joins at the first look. */
+/* A warm start begins with the columns that are not zero; others join at the first look. */
 void eits_working_set_begin(eits_context *ctx)
 {
     uint32_t count = 0;
@@ -56,16 +57,16 @@ void eits_working_set_begin(eits_context *ctx)
     ctx->solver.working_count = count;
 }
 
-/* One merge of two ascending lists, the old set and the columns that would move: linear in
- * n_pixels, without a search. A column of the old set stays as long as x or z is not zero, since
- * momentum may still carry it, whatever its gradient says. The gradient is compacted in place: the
- * write never overtakes the read, as count <= j. x and z go through x_next and the image, which
- * hold nothing between iterations. */
+/* Two ascending lists are merged, the old set and the columns that would move: the cost is linear
+ * in n_pixels, without a search. A column of the old set stays as long as x or z is not zero,
+ * because momentum may still carry it, whatever its gradient is. The gradient is compacted in
+ * place: count <= j, so no number is overwritten before it is read. x and z are copied through
+ * x_next and the image, which are free between iterations. */
 void eits_working_set_choose(eits_context *ctx, const eits_scratch *scratch, eits_real lambda)
 {
     const uint32_t n = ctx->model->n_pixels, before = ctx->solver.working_count;
     const limits rest = limits_for(lambda, ctx->options.sign);
-    /* the image is made after the last iteration */
+    /* the image is computed after the last iteration */
     eits_real *x = ctx->solver.x_next, *z = ctx->solver.image, *gradient = ctx->solver.gradient;
     uint32_t *chosen = scratch->index;
     uint32_t count = 0, j = 0;
@@ -95,7 +96,7 @@ void eits_working_set_choose(eits_context *ctx, const eits_scratch *scratch, eit
     eits_pack_panels(ctx);
 }
 
-/* Between looks the gradient of the set is known anyway, so leaving columns out costs nothing. */
+/* Between looks the gradient of the set is known, so leaving columns out costs nothing. */
 void eits_working_set_prune(eits_context *ctx, eits_real lambda)
 {
     const uint32_t before = ctx->solver.working_count;
@@ -112,12 +113,13 @@ void eits_working_set_prune(eits_context *ctx, eits_real lambda)
         ctx->solver.gradient[count++] = gradient;
     }
     ctx->solver.working_count = count;
-    /* Packing costs about an iteration; not for nothing. */
+    /* Packing costs about as much as an iteration, so it is only done if the set has changed. */
     if (count < before)
         eits_pack_panels(ctx);
 }
 
-/* By way of x_next: in place, the spread would overwrite coefficients not yet read. */
+/* The coefficients are copied through x_next: in place, some would be overwritten before they are
+ * read. */
 void eits_working_set_end(eits_context *ctx)
 {
     eits_zero(ctx->solver.x_next, ctx->model->n_pixels);
@@ -128,9 +130,9 @@ void eits_working_set_end(eits_context *ctx)
 
 /* ---- products over it ---- */
 
-/* S'v over the set, from the fastest copy of its columns that there is: panels (hosts with memory
- * to spare), the column cache (boards: unpacked once, in fast memory), or S as it is stored. All
- * three take each sum in the same order, so which of them is used does not show in the bits. */
+/* S'v over the set is computed from the fastest available copy of its columns: panels (on hosts
+ * with enough memory), the column cache (on boards: unpacked once, in fast memory), or S as it is
+ * stored. All three have the same order of sums, so the bits are the same. */
 void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real *out)
 {
     const eits_matrix *s = &ctx->model->sensitivity;
@@ -146,7 +148,7 @@ void eits_apply_t_working(const eits_context *ctx, const eits_real *v, eits_real
     }
 }
 
-/* Zeros are left out first: the product costs rank multiply-accumulates a column, the test one
+/* Zeros are left out first: the product costs rank multiply-accumulates per column, the test one
  * comparison. The list is in ascending order as in eits_apply, so both give the same bits. */
 uint32_t eits_apply_working(const eits_context *ctx, const eits_scratch *scratch,
                             const eits_real *x, eits_real *out)
@@ -169,8 +171,8 @@ uint32_t eits_apply_working(const eits_context *ctx, const eits_scratch *scratch
     return count;
 }
 
-/* Rows of a working set are scattered over S; side by side they are read in order, again and
- * again. */
+/* The columns of a working set are scattered over S. Side by side in panels they are read in order,
+ * many times. */
 void eits_pack_panels(eits_context *ctx)
 {
     const uint32_t rows = ctx->model->rank;
@@ -184,7 +186,7 @@ void eits_pack_panels(eits_context *ctx)
     for (uint32_t k = 0; k < EITS_PANEL_COLUMNS(ctx->solver.working_count); ++k) {
         eits_real *to = ctx->solver.working_panels + (size_t)(k / EITS_PANEL) * EITS_PANEL * rows +
                         k % EITS_PANEL;
-        /* lanes to spare hold any column */
+        /* unused lanes hold any column */
         const uint32_t j = ctx->solver.working[k < ctx->solver.working_count ? k : 0];
         const eits_real *from =
             ctx->columns.panels + (size_t)(j / EITS_PANEL) * EITS_PANEL * rows + j % EITS_PANEL;
