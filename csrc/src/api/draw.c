@@ -1,13 +1,13 @@
-/* The picture of touches: what each pixel is covered by them.
+/* Draw touches: compute the fraction of each pixel that they cover.
  *
  * The cover of a pixel is clamp(1/2 + d, 0, 1), with d the distance in pixels from its centre to
- * the touch's edge, positive inside: a straight edge that crosses the pixel squarely covers so
- * much of it. For an ellipse with half axes a and b, and (s, t) the place in its own axes over a
- * and b, the distance is, to first order at the edge and exactly for a disc,
+ * the touch's edge, positive inside. This is the covered fraction for a straight edge that crosses
+ * the pixel squarely. For an ellipse with half axes a and b, and (s, t) the place in its own axes
+ * over a and b, the distance is, to first order at the edge and exactly for a disc,
  *
  *     rho = |(s, t)|,    d = (1 - rho) rho / |(s / a, t / b)|
  *
- * Covers of touches that overlap in a pixel are added and end at 1. Sums run in the order of the
+ * Covers of touches that overlap in a pixel are added, up to 1. Sums run in the order of the
  * touches and use no function but the root, so that a host draws the bits of a board. */
 #include "eitskin/touch.h"
 
@@ -21,7 +21,7 @@ typedef struct outline {
     eits_real x, y; /* the centre */
     eits_real a, b; /* half axes, a along (along_x, along_y) */
     eits_real along_x, along_y;
-    eits_real beyond; /* the square of a distance from which on nothing is covered */
+    eits_real beyond; /* the square of a distance beyond which nothing is covered */
 } outline;
 
 static outline outline_of(const eits_model *model, const eits_touch *touch)
@@ -47,7 +47,7 @@ static outline outline_of(const eits_model *model, const eits_touch *touch)
     return o;
 }
 
-/* The cover of the pixel whose centre is at dx, dy from the touch's. */
+/* Return the cover of the pixel whose centre is at dx, dy from the touch's centre. */
 static eits_real cover_of(const outline *o, eits_real dx, eits_real dy)
 {
     const eits_real s = eits_fma(dx, o->along_x, dy * o->along_y) / o->a,
@@ -63,7 +63,7 @@ static eits_real cover_of(const outline *o, eits_real dx, eits_real dy)
     return cover > 0 ? (cover < 1 ? cover : 1) : 0;
 }
 
-/* Whether a touch is drawn: it was found in this frame, and its numbers make an outline. */
+/* Return 1 if a touch is drawn: it was found in this frame, and its numbers give an outline. */
 static int is_drawn(const eits_touch *touch)
 {
     const eits_real numbers[] = {touch->x_mm,      touch->y_mm,      touch->radius_mm,
@@ -72,8 +72,8 @@ static int is_drawn(const eits_touch *touch)
            eits_all_finite(numbers, sizeof numbers / sizeof numbers[0]);
 }
 
-/* The height of every touch: the expected change, or where the model states none, the mean of
- * these touches over their area. */
+/* Return the height of every touch: the expected change or, if the model states none, the mean
+ * change of these touches over their area. */
 static eits_real height_of(const eits_model *model, const eits_touch *touches, uint32_t count)
 {
     const eits_real expected = (eits_real)model->defaults->touch_change_s_per_m;

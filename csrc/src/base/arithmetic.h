@@ -11,7 +11,8 @@
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "the core must be compiled without -ffast-math and -ffinite-math-only"
 #endif
-/* 0: each operation in the width of its operands; 1: float as double, which is none to double */
+/* 0: each operation has the width of its operands; 1: float is computed as double, which does not
+ * affect double */
 #if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0
 #if !defined(EITS_DOUBLE) || __FLT_EVAL_METHOD__ != 1
 #error "the core must be compiled without excess precision; on x86 use -msse2 -mfpmath=sse"

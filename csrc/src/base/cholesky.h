@@ -28,8 +28,8 @@ eits_real eits_cholesky_row(eits_real *lower, uint32_t i);
 void eits_lower_solve(eits_real *lower, uint32_t n, eits_real *v);
 void eits_lower_solve_transposed(eits_real *lower, uint32_t n, eits_real *v);
 
-/* Rows first ... last - 1 of column `last` - 1 of A^-1, in v[first] ... v[last - 1]; v has room for
- * n numbers. The bits are those of both solves with a unit vector. */
+/* Compute rows first ... last - 1 of column `last` - 1 of A^-1, in v[first] ... v[last - 1]; v has
+ * room for n numbers. The bits are those of both solves with a unit vector. */
 void eits_lower_inverse(eits_real *lower, uint32_t n, uint32_t first, uint32_t last, eits_real *v);
 
 #endif

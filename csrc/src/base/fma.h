@@ -1,6 +1,6 @@
-/* eits_fma(a, b, c): a b + c, rounded once. The C library's is exact but for mingw-w64's, which
- * rounds twice; there these are used, unless the compiler may use the processor's own. Include
- * base/arithmetic.h before, which forbids contraction. */
+/* eits_fma(a, b, c) is a b + c, rounded once. The function of C libraries is exact, except that of
+ * mingw-w64, which rounds twice. There the functions below are used, unless the compiler may use
+ * the processor's own instruction. Include base/arithmetic.h first; it forbids contraction. */
 #ifndef EITSKIN_FMA_H
 #define EITSKIN_FMA_H
 
@@ -36,7 +36,8 @@ static inline float eits_float_fma(float a, float b, float c)
 #define eits_fma fmaf
 #endif
 #elif defined(EITS_DOUBLE)
-/* By the processor's instruction, if it has one; else twice rounded, which eits_init reports. */
+/* Uses the processor's instruction, if it has one; otherwise the result is rounded twice, which
+ * eits_init reports. */
 double eits_double_fma(double a, double b, double c);
 #define eits_fma eits_double_fma
 #else

@@ -69,7 +69,8 @@ static inline int eits_all_finite(const eits_real *values, size_t count)
     return all;
 }
 
-/* The unit vector at half the angle of x, y, which is `size` long: between -90 and 90 degrees. */
+/* Compute the unit vector at half the angle of (x, y), between -90 and 90 degrees; `size` is the
+ * length of (x, y). */
 static inline void eits_half_angle(eits_real x, eits_real y, eits_real size, eits_real axis[2])
 {
     const eits_real cosine = x / size;

@@ -1,7 +1,7 @@
-/* Turn voltages into reduced data: difference to the reference, fold, and projection on the
+/* Turn voltages into reduced data: take the difference from the reference, fold, and project on the
  * directions in use.
  *
- * A frame has one voltage per row; the solver wants `rank` numbers with all of the frame's
+ * A frame has one voltage per row; the solver needs `rank` numbers with all of the frame's
  * information about the conductivity. Three linear steps make them, in this order:
  *
  *   datum   gain (v - v0), or its ratio or logarithm as the model was built. The difference removes

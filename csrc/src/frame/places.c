@@ -9,8 +9,8 @@
  * along either axis, with x and y from the grid's middle over half its longer side.
  * context/places.c subtracts this shift; |N'y|^2 is the variance of the remaining error. Directions
  * of y that no such skin has show how much of y comes from gains of single rows: the more, the
- * smaller the correction. Touches that are fitted jointly, on the folds, are displaced otherwise
- * than those of reduced data, so section ROWE has M and U of their own.
+ * smaller the correction. Touches that are fitted jointly, on the folds, are displaced in another
+ * way than those of reduced data, so section ROWE has its own M and U.
  * python/eitskin/model/tare_places.py has the formulas. */
 #include "frame/reference.h"
 

@@ -14,7 +14,7 @@
 #include "base/vec.h"
 #include "frame/constants.h"
 
-/* Returns the regularisation that the noise asks for.
+/* Return the regularisation that the noise requires.
  *
  * Noise over the reference's rms is the fraction of noise in the data of an untouched skin; the
  * factor was fitted to the noise that then shows in the image. Without a learned reference the

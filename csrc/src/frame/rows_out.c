@@ -2,15 +2,15 @@
  * rest.
  *
  * A taught model's P = U'W whitens noise of covariance C, and its section PREC has R = C^-1 over
- * what makes P R^-1 P' = I. The rows m left out are given what the noise of the others o makes them
- * expect, d_m = -R_mm^-1 R_mo d_o. With Q = P_m R_mm^-1 P_m' the residual in the metric of the rows
- * left, (C_oo)^-1, is
+ * what makes P R^-1 P' = I. The rows m that are left out get their expected values given the
+ * others, o: d_m = -R_mm^-1 R_mo d_o. With Q = P_m R_mm^-1 P_m' the residual in the metric of the
+ * remaining rows, (C_oo)^-1, is
  *
  *     |F'^-1 P d - F S x|^2,   F'F = I - Q,   F an upper triangle
  *
- * for Schur's complement of R_mm in R is the inverse of C_oo. One electrode out of sixteen then
- * costs a tenth of the error and not its double, as projecting P's columns out of the data does:
- * they are nearly as many as P has rows. */
+ * because Schur's complement of R_mm in R is the inverse of C_oo. Without one electrode of sixteen
+ * the error then grows by a tenth. Projecting P's columns out of the data would double it, because
+ * there are nearly as many of them as P has rows. */
 #include "frame/whitening.h"
 
 #include "base/cholesky.h"
@@ -62,7 +62,7 @@ uint64_t eits_fill_build(eits_context *ctx, const eits_scratch *scratch)
     eits_zero(f, EITS_PADDED_TRIANGLE(rank));
     for (uint32_t i = 0; i < rank; ++i)
         row_of(ctx, f, i)[i] = 1;
-    /* Z = L^-1 P_m', a row of it for each row left out; I - Z'Z as it comes. */
+    /* Z = L^-1 P_m' has a row for each row that is left out; I - Z'Z is summed row by row. */
     for (uint32_t a = 0; a < count; ++a) {
         eits_real *z = scratch->square + a * stride;
         const eits_real *row = eits_lower_row(ctx->whitening.metric, a);

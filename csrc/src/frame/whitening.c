@@ -76,9 +76,9 @@ static uint64_t sum_products(eits_context *ctx, const eits_scratch *scratch, uin
 
 /* G G' = R diag(s^2) R' + regularisation I, from the last row up.
  *
- * G is upper triangular although G G' is asked for: from the last row up, each row needs only
- * those below it. So G^-1 R stays upper triangular, and F with it: half the memory and half the
- * work of a full matrix, in each iteration of a solver. */
+ * G is upper triangular, although the product is G G': from the last row up, each row needs only
+ * the rows below it. Therefore G^-1 R and F are upper triangular, too, which takes half the memory
+ * and half the work of a full matrix in each iteration of a solver. */
 static uint64_t factor_metric(eits_context *ctx, const eits_scratch *scratch,
                               eits_real regularisation, eits_real *r, eits_real *g)
 {
@@ -92,7 +92,7 @@ static uint64_t factor_metric(eits_context *ctx, const eits_scratch *scratch,
             scaled[k] = row_of(ctx, r, i)[k] * ctx->whitening.row_strength[k];
         for (uint32_t j = rank; j-- > i;) {
             const eits_real product = dot_of_row(ctx, j, scaled, row_of(ctx, r, j));
-            /* row[j] is zero yet */
+            /* row[j] is still zero */
             const eits_real left = product - dot_of_row(ctx, j, row, row_of(ctx, g, j));
             if (j > i)
                 row[j] = left / row_of(ctx, g, j)[j];
@@ -106,8 +106,8 @@ static uint64_t factor_metric(eits_context *ctx, const eits_scratch *scratch,
 
 /* F = G^-1 R diag(fraction / w) in R's place, from the last row up.
  *
- * Solved in place, row by row from below: row i of G^-1 R needs the rows below it finished.
- * Scaling by 1 / w comes last, since it is by columns. */
+ * The system is solved in place, row by row from below, because row i of G^-1 R needs the rows
+ * below it. Scaling by 1 / w comes last, because it scales columns. */
 static uint64_t finish_whitening(const eits_context *ctx, eits_real fraction, eits_real *g,
                                  eits_real *r)
 {
@@ -132,17 +132,17 @@ static uint64_t finish_whitening(const eits_context *ctx, eits_real fraction, ei
 
 /* Noise in S'F'y, over that in S'y with all rows. White noise on the rows has the covariance
  * (G'G)^-1 in y; its mean square over S's columns is the trace of S'F' (G'G)^-1 F S, found by
- * EITS_NOISE_PROBES sign vectors that are orthogonal within each EITS_NOISE_PROBES directions. The
- * greatest of the columns grows faster than their mean does by rows left out, by an exponent found
- * on masks of one row to three electrodes. */
+ * EITS_NOISE_PROBES sign vectors that are orthogonal within each EITS_NOISE_PROBES directions. If
+ * rows are left out, the maximum over the columns grows faster than their mean; the exponent was
+ * fitted on masks of one row to three electrodes. */
 static uint64_t measure_noise(eits_context *ctx, const eits_scratch *scratch)
 {
     const uint32_t rank = ctx->model->rank;
     eits_real *v = scratch->row[3], sum = 0, total = 0;
     for (uint32_t p = 0; p < EITS_NOISE_PROBES; ++p) {
         for (uint32_t i = 0; i < rank; ++i) {
-            /* Fixed signs, the rows of a Hadamard matrix: the same bits anywhere, and no two probes
-             * alike. */
+            /* The signs are fixed, the rows of a Hadamard matrix: the bits are the same on every
+             * target, and all probes differ. */
             const uint32_t both = i & p, odd = (both ^ both >> 1 ^ both >> 2) & 1u;
             const eits_real size =
                 eits_sqrt(ctx->whitening.row_strength[i]) / ctx->whitening.row_scale[i];
@@ -193,10 +193,10 @@ static void raise_regularisation(eits_context *ctx)
                             eits_regularisation_weights(ctx, regularisation, ctx->whitening.map);
 }
 
-/* In order: N of the rows in use, its factor R, then G from R, then F from both. R and F share
- * one triangle, N another's place before them. Where any number overflows the stored whitening
- * is used, and the rows left out are ignored by projection (frame/fold.c): worse, but always
- * defined. */
+/* The order is N of the rows in use, its factor R, then G from R, then F from both. R and F share
+ * one triangle; before them, N uses the place of the other. If any number overflows, the stored
+ * whitening is used, and the rows that are left out are projected out (frame/fold.c), which is less
+ * accurate but always defined. */
 static uint64_t build_triangle(eits_context *ctx, const eits_scratch *scratch,
                                eits_real regularisation, uint32_t missing)
 {
@@ -233,7 +233,7 @@ uint64_t eits_whitening_build(eits_context *ctx, const eits_scratch *scratch)
     ctx->whitening.noise_ratio = 1;
     if (!ctx->whitening.possible) {
         const uint32_t rank = ctx->model->rank, spare = folded > rank ? folded - rank : 0;
-        /* with fewer rows left than directions, projecting loses nothing */
+        /* if fewer rows than directions are in use, projecting loses nothing */
         return missing > 0 && missing <= (rank < spare ? rank : spare) &&
                        ctx->model->precision != NULL
                    ? eits_fill_build(ctx, scratch)
@@ -267,7 +267,7 @@ uint64_t eits_whiten_data(eits_context *ctx, eits_real *v)
     return 3u * triangle_macs(ctx);
 }
 
-/* y = sqrt(square) G^-1 R'^-1 U_o' d_o / s_1, and U_o' U_o is R'R but for e: white noise of
+/* y = sqrt(square) G^-1 R'^-1 U_o' d_o / s_1, and U_o' U_o = R'R except for e. So white noise of
  * variance 1 has the covariance square / s_1^2 G^-1 G'^-1. */
 uint64_t eits_noise_direction(const eits_context *ctx, uint32_t k, eits_real *out)
 {

@@ -42,17 +42,16 @@ eits_real eits_detection_threshold(const eits_context *ctx);
  */
 uint64_t eits_whiten_data(eits_context *ctx, eits_real *v);
 
-/* While whitening.form is EITS_WHITENING_TRIANGLE: the k-th of `rank` directions (stride numbers)
- * that white noise of variance 1 on the rows in use moves the data along, each independently: its
- * covariance is the sum of their outer products. Returns the multiply-accumulates. */
+/* While whitening.form is EITS_WHITENING_TRIANGLE: compute the k-th of `rank` directions (stride
+ * numbers) whose outer products sum up to the covariance of the data for white noise of variance 1
+ * on the rows in use. Returns the multiply-accumulates. */
 uint64_t eits_noise_direction(const eits_context *ctx, uint32_t k, eits_real *out);
 
-/* v = F v (stride numbers); v as it is where nothing is whitened for masked rows. Returns the
- * multiply-accumulates. */
+/* v = F v (stride numbers); v is unchanged if F = 1. Returns the multiply-accumulates. */
 uint64_t eits_whiten(const eits_context *ctx, eits_real *v);
 
-/* out = y - Q F sx (stride numbers each), y being projected already. Returns the
- * multiply-accumulates of F and Q. */
+/* out = y - Q F sx (stride numbers each); y is already projected. Returns the multiply-accumulates
+ * of F and Q. */
 uint64_t eits_residual(const eits_context *ctx, const eits_real *sx, eits_real *out);
 
 /* v = Q F v, Q taking the basis' directions out. Returns the multiply-accumulates, also beforehand.
@@ -60,17 +59,18 @@ uint64_t eits_residual(const eits_context *ctx, const eits_real *sx, eits_real *
 uint64_t eits_forward(const eits_context *ctx, eits_real *v);
 uint64_t eits_forward_macs(const eits_context *ctx);
 
-/* F' v, in `room` (stride numbers), for a v within Q's directions; v itself where nothing is
- * whitened for masked rows. */
+/* Return F' v, in `room` (stride numbers), for a v that Q leaves unchanged; return v itself if F =
+ * 1. */
 const eits_real *eits_adjoint(const eits_context *ctx, const eits_real *v, eits_real *room);
 uint64_t eits_adjoint_macs(const eits_context *ctx);
 
 /* ---- regularisation.c ----
  *
- * The regularisation mu of the whitening, raised where the reference was noisy. The builder's w =
- * (s^2 + mu s_1^2)^-1/2 lets weak directions speak, and with them the noise. A model of the
- * regularisation mu' > mu has each row of P and S multiplied by D_i = sqrt((s_i^2 + mu s_1^2) /
- * (s_i^2 + mu' s_1^2)), but for a common factor: the whitening F = D, where no row is left out. */
+ * The regularisation mu of the whitening is raised if the reference was noisy. The builder's w =
+ * (s^2 + mu s_1^2)^-1/2 amplifies weak directions, and their noise. In a model with the
+ * regularisation mu' > mu each row of P and S is multiplied by D_i = sqrt((s_i^2 + mu s_1^2) /
+ * (s_i^2 + mu' s_1^2)), except for a common factor. So if no row is left out, the whitening is F =
+ * D. */
 
 /* Returns mu' with all rows in use: the model's, or regularisation_noise_factor times the noise
  * over the reference's rms if that is larger. */

@@ -13,7 +13,7 @@
 
 /* out = D v.
  *
- * The loop runs over the whole stride, whose padding is zeros: it needs no remainder. */
+ * The loop runs over the whole stride, whose padding is zero, so no remainder has to be handled. */
 static void weigh(const eits_context *ctx, const eits_real *v, eits_real *out)
 {
     const eits_real *weight = ctx->whitening.map;
@@ -68,14 +68,14 @@ uint64_t eits_forward_macs(const eits_context *ctx)
 
 const eits_real *eits_adjoint(const eits_context *ctx, const eits_real *v, eits_real *room)
 {
-    /* F is the identity: no copy is made, and none of its time is spent. */
+    /* F is the identity, so no copy is made. */
     if (!ctx->whitening.form)
         return v;
     if (ctx->whitening.form == EITS_WHITENING_DIAGONAL) {
         weigh(ctx, v, room);
         return room;
     }
-    /* F' by adding up F's rows: the transpose of what is stored by rows needs no gathering. */
+    /* F' v is the sum of F's rows times the numbers of v, so the transpose needs no gathering. */
     eits_zero(room, EITS_STRIDE(ctx->model->rank));
     for (uint32_t i = 0; i < ctx->model->rank; ++i)
         add_row(ctx, i, room, v[i], row_of(ctx, ctx->whitening.map, i));

@@ -30,7 +30,7 @@ static inline eits_complex eits_conjugate(eits_complex a)
     return (eits_complex){a.re, -a.im};
 }
 
-/* 1 / a; 0 where a is all but zero: two middles in one place. */
+/* Return 1 / a, or 0 if a is almost zero, as with two middles in one place. */
 static inline eits_complex eits_inverse(eits_complex a)
 {
     const eits_real square = eits_fma(a.re, a.re, a.im * a.im);

@@ -26,7 +26,7 @@ void eits_add_times(eits_real *out, eits_complex s, const eits_real *a, uint32_t
     }
 }
 
-/* eta and e^(i phi) of the long axis. */
+/* Return eta; `axis` gets e^(i phi) of the long axis. */
 static eits_real long_axis(const eits_shape *s, eits_complex *axis)
 {
     const eits_real eta = eits_pole_eta(s);

@@ -1,4 +1,4 @@
-/* One shape: what it makes of the field in which it lies. */
+/* One shape, and its response to the field in which it lies. */
 #ifndef EITSKIN_FORM_H
 #define EITSKIN_FORM_H
 
@@ -22,7 +22,7 @@ typedef struct eits_form {
 
 eits_form eits_form_of(const eits_shape *s, uint32_t orders);
 
-/* beta_n of each electrode from the Taylor coefficients `a`. */
+/* Compute beta_n of each electrode from the Taylor coefficients `a`. */
 void eits_modes(const eits_form *f, const eits_real *a, uint32_t electrodes, eits_real *out);
 
 /* out += s a, for complex arrays of `electrodes` numbers (real parts, then imaginary parts). */

@@ -1,22 +1,23 @@
-/* Compute what shapes send into each other, and by the rim into themselves.
+/* Compute the fields that shapes send to each other and, through the rim, to themselves.
  *
- * Each shape lies in a field a_n (multipole.h) and sends out sum_k B_k (z - c)^-k, with B_k a
- * linear function of conj(a_n). About another shape's middle c_i that is a Taylor series again,
+ * Each shape lies in a field a_n (multipole.h) and sends out sum_k B_k (z - c)^-k, where B_k is a
+ * linear function of conj(a_n). About another shape's middle c_i this is again a Taylor series,
  *
  *     (t + s)^-k = sum_q t^(-k-q) binomial(-k, q) s^q,    t = c_i - c_j
  *
- * The rim, which no current crosses, mirrors each source: conj(B_k) h(z)^k. The model stores a and
- * b of D = a - b z (docs/reference/eitm-format.md, "FLDS"), which make a circle of radius R through
- * which the rim passes near the source. With 1 / R = (1 - |b|^2) / (a - b c_j), 0 where the rim is
- * straight, h = (conj(b) + (z - c_j) / R) / D. For a round skin the circle is the rim, and h = z /
- * (R D). All have h_q = b^(q-1) / D^(q+1) for q > 0. A shape meets its own image, too. Rounds: in
- * each, every shape sends what the field of the round before makes it send.
+ * No current crosses the rim, so it mirrors each source: the image is conj(B_k) h(z)^k. The model
+ * stores a and b of D = a - b z (docs/reference/eitm-format.md, "FLDS"), which make a circle of
+ * radius R through which the rim passes near the source. With 1 / R = (1 - |b|^2) / (a - b c_j), 0
+ * where the rim is straight, h = (conj(b) + (z - c_j) / R) / D. For a round skin the circle is the
+ * rim, and h = z / (R D). In all cases h_q = b^(q-1) / D^(q+1) for q > 0. A shape also lies in the
+ * field of its own image. The computation has rounds: in each, every shape responds to the field of
+ * the round before.
  */
 #include "base/vec.h"
 #include "multipole/constants.h"
 #include "multipole/form.h"
 
-/* B_1 ... B_sent of each electrode from the modes of the field that the shape lies in. */
+/* Compute B_1 ... B_sent of each electrode from the modes of the field in which the shape lies. */
 static void send(const eits_form *f, const eits_real *mode, uint32_t sent, uint32_t electrodes,
                  eits_real *out)
 {
@@ -96,7 +97,8 @@ static mirror mirror_of(const eits_context *ctx, uint32_t j, const eits_shape *s
     return m;
 }
 
-/* A - B z vanishes at the image of the middle, which lies as far behind the rim as that before it.
+/* a - b z vanishes at the image of the middle. The image lies as far behind the rim as the middle
+ * lies before it.
  */
 eits_real eits_pole_room(const eits_context *ctx, uint32_t k, const eits_shape *shape)
 {
@@ -107,7 +109,7 @@ eits_real eits_pole_room(const eits_context *ctx, uint32_t k, const eits_shape *
     return square > 0 ? eits_sqrt(eits_fma(d.re, d.re, d.im * d.im) / square) / 2 : R(INFINITY);
 }
 
-/* h_0 ... h_terms about `at`. */
+/* Compute h_0 ... h_terms about `at`. */
 static void mirror_series(const mirror *m, eits_complex at, uint32_t terms, eits_complex *h)
 {
     const eits_complex bz = eits_times(m->b, at),
@@ -124,7 +126,7 @@ static void mirror_series(const mirror *m, eits_complex at, uint32_t terms, eits
     }
 }
 
-/* The first terms of the product of two series. */
+/* Compute the first terms of the product of two series, in a. */
 static void multiply_series(eits_complex *a, const eits_complex *b, uint32_t terms)
 {
     eits_complex out[EITS_POLE_TERMS + 1];
@@ -140,8 +142,8 @@ static void multiply_series(eits_complex *a, const eits_complex *b, uint32_t ter
         a[n] = out[n];
 }
 
-/* 1 / (c_i - c_j). Inside each other shapes are no multipoles: nearer than they touch, they are
- * taken as touching. */
+/* Return 1 / (c_i - c_j). The multipole series does not hold for overlapping shapes: if they are
+ * nearer than touching, they count as touching. */
 static eits_complex nearness_of(const eits_shape *i, const eits_shape *j)
 {
     const eits_complex apart = {i->x - j->x, i->y - j->y};
@@ -154,7 +156,7 @@ static eits_complex nearness_of(const eits_shape *i, const eits_shape *j)
     return eits_scaled(eits_sqrt(square / least), eits_inverse(apart));
 }
 
-/* Add to the field about shape i what shape j sends there, directly and by its image. */
+/* Add to the field about shape i the field that shape j sends there, directly and by its image. */
 static uint64_t receive(const eits_context *ctx, const eits_shape *shape, uint32_t i, uint32_t j,
                         const mirror *m, const eits_poles *poles)
 {
@@ -182,7 +184,7 @@ static uint64_t receive(const eits_context *ctx, const eits_shape *shape, uint32
             eits_real *re = to + width * (q - 1u), *im = re + electrodes;
             term =
                 eits_scaled(-((eits_real)(k + q - 1u) / (eits_real)q), eits_times(term, nearness));
-            /* term B + image conj(B), where term is that of another shape */
+            /* term B + image conj(B); a shape sends no direct term to itself */
             const eits_complex own = i == j ? (eits_complex){0, 0} : term;
             const eits_real by_re = own.re + image[q].re, by_im = image[q].im - own.im,
                             im_by_re = own.im + image[q].im, im_by_im = own.re - image[q].re;

@@ -1,11 +1,11 @@
-/* Compute what shapes answer on the folded rows.
+/* Compute the answers of shapes on the folded rows.
  *
- * A row's answer is the drive's field with what is induced, times the measuring pair's without it.
- * By reciprocity the reverse is the same once the rounds have converged.
+ * A row's answer is the product of the drive's field with the induced field, and the measuring
+ * pair's field without it. By reciprocity the reverse is the same once the rounds have converged.
  *
- * The answer is bilinear in both sides' Taylor coefficients. For each drive the coefficients by
- * which it and its slopes multiply those of a measuring pair are made once; a row then takes one
- * sum of products for the answer and for each slope. */
+ * The answer is bilinear in the Taylor coefficients of both sides. For each drive, the factors of a
+ * measuring pair's coefficients are computed once, for the answer and for its slopes. A row then
+ * needs one sum of products for the answer and one for each slope. */
 #include "base/vec.h"
 #include "multipole/constants.h"
 #include "multipole/form.h"
@@ -15,7 +15,8 @@ static const eits_real PI = R(3.14159265358979323846);
 enum { ORDERS = EITS_POLE_ORDERS, OF_DISC = EITS_POLE_DISC_ORDERS, TERMS = EITS_POLE_TERMS };
 enum { SLOPES_OF_DISC = 4, SLOPES = 6 };
 
-/* What orders weigh in a row's voltage: c for products of real parts, s of imaginary ones. */
+/* The weights of the orders in a row's voltage: c for products of real parts, s for products of
+ * imaginary parts. */
 typedef struct order_weights {
     eits_real c[ORDERS], s[ORDERS];
 } order_weights;
@@ -34,7 +35,7 @@ static order_weights weights_of(const eits_context *ctx, const eits_form *f)
     return w;
 }
 
-/* The same, times the relative change of each order's weight with the amplitude. */
+/* Return the weights times the relative change of each order's weight with the amplitude. */
 static order_weights by_amplitude(const order_weights *w, const eits_form *f, eits_real amplitude)
 {
     const eits_real of_contrast = 4 / ((2 - amplitude) * (2 - amplitude)),
@@ -60,7 +61,8 @@ static eits_shape varied(const eits_shape *shape, int part)
     return out;
 }
 
-/* A shape as the rows take it; with `more`, one whose e1 or e2 is larger. */
+/* A shape in the form that the rows need. In the functions below `more` is the shape with a
+ * slightly larger e1 or e2. */
 typedef struct answering {
     eits_form form;
     order_weights weight;
@@ -102,8 +104,8 @@ static inline void answer_of(const eits_form *f, const order_weights *w, const e
         eits_plus_times(eits_plus_times(eits_times(t[4][4], g[4]), t[0][4], g[0]), t[2][4], g[2]);
 }
 
-/* By what a drive multiplies a measuring pair's numbers (real part and imaginary part of each
- * term): for the answer, then for the slopes in the order of eits_pole_out. */
+/* The factors by which a drive multiplies a measuring pair's numbers (real part and imaginary part
+ * of each term): for the answer, then for the slopes in the order of eits_pole_out. */
 typedef struct drive {
     eits_real by[1 + SLOPES][2 * TERMS];
 } drive;
@@ -116,7 +118,7 @@ static inline void put(eits_real *by, const eits_complex *c, uint32_t terms)
     }
 }
 
-/* The difference of two electrodes' coefficients, with what is induced. */
+/* Compute the difference of two electrodes' coefficients, including the induced field. */
 static void whole_field(const eits_real *own, const eits_real *induced, uint32_t electrodes,
                         const uint8_t *row, eits_complex *a)
 {
@@ -170,8 +172,8 @@ static void disc_drive(const answering *s, eits_real by_amplitude_share, int slo
     put(d->by[4], other, OF_DISC);
 }
 
-/* The answer, and slopes by place, log radius and amplitude; a_k r^k is what a larger radius
- * scales.
+/* Compute the factors of an ellipse for the answer and the slopes by place, log radius and
+ * amplitude. A larger radius scales a_k r^k.
  */
 static void ellipse_drive(const answering *s, const order_weights *by_q, int slopes,
                           const eits_complex *a, eits_complex *c, drive *d)
@@ -203,7 +205,7 @@ static void ellipse_drive(const answering *s, const order_weights *by_q, int slo
     put(d->by[4], x, ORDERS);
 }
 
-/* Slope by e1 or e2, as a difference. */
+/* Compute the slope by e1 or e2, as a finite difference. */
 static inline void slope_by_shape(const answering *more, const eits_complex *a,
                                   const eits_complex *c, eits_real *by)
 {
@@ -222,13 +224,13 @@ static const uint8_t *fold_row(const eits_context *ctx, uint32_t fold)
     return eits_row(ctx, ctx->model->fold[fold].first);
 }
 
-/* Whether a row's drive is another than that of the row before. */
+/* Return 1 if a row's drive is not that of the row before. */
 static int new_drive(const uint8_t *row, const uint8_t *before)
 {
     return before == NULL || row[0] != before[0] || row[1] != before[1];
 }
 
-/* The next number of a measuring pair, into the answer and the slopes. */
+/* Add the next number of a measuring pair to the answer and the slopes. */
 #define NEXT_NUMBER(J)                                        \
     do {                                                      \
         const eits_real number = *plus - *minus;              \
@@ -245,7 +247,7 @@ static int new_drive(const uint8_t *row, const uint8_t *before)
         }                                                     \
     } while (0)
 
-/* The last order, which slopes by place alone have. */
+/* Add the last order, which only the slopes by place have. */
 #define LAST_NUMBER(J)                           \
     do {                                         \
         const eits_real number = *plus - *minus; \
@@ -255,8 +257,8 @@ static int new_drive(const uint8_t *row, const uint8_t *before)
         y = eits_fma(d->by[2][J], number, y);    \
     } while (0)
 
-/* The answer to a measuring pair, and its slopes: of discs (three orders) or ellipses (five).
- * Written out, so that the sums stay in registers. */
+/* Compute the answer to a measuring pair and its slopes, for discs (three orders) or ellipses
+ * (five). The code is written out, so that the sums stay in registers. */
 static inline void fill_row(const drive *d, const eits_real *own, uint32_t electrodes,
                             const uint8_t *row, int shaped, uint32_t i, const eits_pole_out *out)
 {
@@ -288,7 +290,7 @@ static inline void fill_row(const drive *d, const eits_real *own, uint32_t elect
     out->slope[3][i] = amplitude;
 }
 
-/* The answer alone; `numbers` is constant where this is called. */
+/* Return the answer alone. `numbers` is a constant in each call. */
 static inline eits_real value_of(const eits_real *by, const eits_real *own, uint32_t electrodes,
                                  const uint8_t *row, uint32_t numbers)
 {
@@ -299,7 +301,7 @@ static inline eits_real value_of(const eits_real *by, const eits_real *own, uint
     return value;
 }
 
-/* The numbers of a drive that its rows share. */
+/* Compute the numbers of a drive that its rows share. */
 static void make_drive(const answering s[3], const order_weights *by_q, uint32_t slopes,
                        const eits_complex *a, drive *d)
 {

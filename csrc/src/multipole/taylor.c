@@ -1,11 +1,12 @@
-/* The electrodes' fields about a place, as analytic polynomials.
+/* Represent the electrodes' fields about a place by analytic polynomials.
  *
  * Section FLDS stores E_x and E_y of each electrode's current on every pixel. In an even sheet F =
  * E_x - i E_y is analytic, so a polynomial in z of degree 5 fitted to the pixels within 2.6 of the
  * home pixel (21 inside the skin, fewer at its rim) gives the field between pixels and its
  * derivatives. Weights fall with the distance, 1 - (d / 2.6)^2. The least squares use polynomials
  * that are orthogonal on these pixels (modified Gram-Schmidt, twice for accuracy in float32): the
- * monomials' normal equations would lose half of the digits where the rim leaves half a circle. */
+ * monomials' normal equations would lose half of the digits at the rim, where only half a circle of
+ * pixels is left. */
 #include "multipole/multipole.h"
 
 #include "base/vec.h"
@@ -53,7 +54,8 @@ static uint32_t cell_at(eits_real at, uint32_t count)
     return at > 0 ? (at < last ? (uint32_t)at : count - 1u) : 0;
 }
 
-/* The kept pixel nearest to a place; where its own cell is off the skin, among those around it. */
+/* Return the kept pixel nearest to a place. If the place's own cell is off the skin, the pixels
+ * around it are examined. */
 static uint32_t home_pixel(const eits_context *ctx, const eits_shape *shape)
 {
     const eits_model *model = ctx->model;
@@ -80,7 +82,8 @@ static uint32_t home_pixel(const eits_context *ctx, const eits_shape *shape)
     return best;
 }
 
-/* Whether a place of the square around the home pixel is near enough; where it is, and how far. */
+/* Return 1 if a place of the square around the home pixel is near enough; `z` gets its position,
+ * and `share` its squared distance over that of EITS_POLE_REACH. */
 static int is_near(uint32_t place, eits_complex *z, eits_real *share)
 {
     const uint32_t side = 2u * AROUND + 1u;
@@ -117,7 +120,8 @@ static points points_around(const eits_context *ctx, uint32_t home)
     return p;
 }
 
-/* The points of a home pixel with all of its neighbours, which are the same everywhere. */
+/* Return the points of a home pixel with all of its neighbours; they are the same for each such
+ * pixel. */
 static points all_points(void)
 {
     points p;
@@ -172,8 +176,8 @@ static void make_basis(const points *p, basis *b)
     }
 }
 
-/* The weight of each point's F in each coefficient: T^-1 Q* W, in powers of z instead of z /
- * EITS_POLE_UNIT. Coefficients that the points do not determine are 0. */
+/* Compute the weight of each point's F in each coefficient: T^-1 Q* W, in powers of z instead of z
+ * / EITS_POLE_UNIT. Coefficients that the points do not determine are 0. */
 static void weigh_points(const points *p, const basis *b, eits_complex *weight)
 {
     for (uint32_t i = 0; i < p->count; ++i) {
@@ -194,7 +198,7 @@ static void weigh_points(const points *p, const basis *b, eits_complex *weight)
     }
 }
 
-/* A stored column: E_x, E_y, then the mirror. */
+/* Read a stored column: E_x, E_y, then the mirror. */
 static void read_fields(const eits_context *ctx, uint32_t pixel, eits_real *at)
 {
 #ifndef EITS_DOUBLE
@@ -205,7 +209,8 @@ static void read_fields(const eits_context *ctx, uint32_t pixel, eits_real *at)
 #endif
 }
 
-/* The coefficients of F = E_x - i E_y of all electrodes, and the mirror at the home pixel. */
+/* Compute the coefficients of F = E_x - i E_y of all electrodes, and the mirror at the home pixel.
+ */
 static void fit_fields(eits_context *ctx, const points *p, const eits_complex *weight,
                        uint32_t home, eits_real *terms, eits_real *mirror)
 {
@@ -238,7 +243,8 @@ void eits_pole_init(eits_context *ctx)
     eits_pole_forget(ctx);
 }
 
-/* Whether the polynomial in slot k serves a middle that has left its home pixel, but not by far. */
+/* Return 1 if the polynomial in slot k can still be used for a middle that has left its home pixel,
+ * but is not far from it. */
 static int may_stay(const eits_context *ctx, uint32_t k, const eits_shape *shape)
 {
     if (ctx->multipole.home_pixel[k] == EITS_NO_HOME)
@@ -288,8 +294,8 @@ int eits_pole_on_skin(const eits_context *ctx, eits_real x, eits_real y)
     return ctx->cell[(size_t)(uint32_t)y * model->nx + (uint32_t)x] != EITS_NO_PIXEL;
 }
 
-/* a_n+1 of all electrodes from terms n, n + 1, ... of F: n is constant where this is called, so
- * that the factors stay in registers. */
+/* Compute a_n+1 of all electrodes from the terms n, n + 1, ... of F. n is a constant in each call,
+ * so that the factors stay in registers. */
 static inline void shift_term(const eits_real *terms, const eits_complex *power, uint32_t n,
                               uint32_t electrodes, eits_real *out)
 {
