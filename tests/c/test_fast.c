@@ -570,6 +570,32 @@ TEST(test_frames_of_a_named_electrode_are_solved)
     states[3] = 0;
 }
 
+/* An error that was learned wrongly in one drive takes strength from the touch in that drive. It is
+ * learned again from what the drive leaves, and does not grow from scan to scan. */
+TEST(test_a_wrong_error_does_not_grow)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    drives(b, 8);
+    put(b, 0, 20, 11, 1);
+    drives(b, 80);
+    while (b->next != 3)
+        drives(b, 1);
+    drives(b, 1);
+    const fast_drive *d = &b->fast->drive[3];
+    for (uint32_t i = d->first; i < (uint32_t)d->first + d->count; ++i)
+        b->fast->bias[i] += R(0.1) * b->fast->bias_h[i];
+    const double strength = (double)b->fast->state[FAST_C];
+    double most = 0;
+    for (uint32_t scan = 0; scan < 30; ++scan) {
+        for (uint32_t n = 0; n < eits_fast_drives(b->fast); ++n) {
+            drives(b, 1);
+            const double off = fabs((double)b->fast->state[FAST_C] / strength - 1);
+            most = off > most ? off : most;
+        }
+    }
+    CHECK(most < 0.12);
+}
+
 /* Its place grows less sure by the same variance in each drive that does not show it, and sure
  * again as soon as one does. */
 TEST(test_a_touch_that_no_row_shows)

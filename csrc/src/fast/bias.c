@@ -126,10 +126,9 @@ static eits_real row_variance(const eits_fast *fast, uint32_t i)
     return fast_square(fast->sigma) + fast->error[i];
 }
 
-void eits_fast_learn(eits_fast *fast, uint32_t drive, const eits_real *strength)
+void eits_fast_learn(eits_fast *fast, uint32_t drive)
 {
     fast_drive *d = &fast->drive[drive];
-    const size_t size = FAST_WAYS * (size_t)fast->most_rows;
     eits_real *left = fast->spare;
     d->learned = 1;
     /* An update leaves R S^-1 e of the rows. */
@@ -139,9 +138,8 @@ void eits_fast_learn(eits_fast *fast, uint32_t drive, const eits_real *strength)
         left[i] /= line[i];
         fast_axpy(left, -left[i], line, i);
     }
-    for (uint32_t k = 0; k < fast->count; ++k)
-        fast_axpy(fast->h, fast->state[FAST_SIZE * k + FAST_C] - strength[k],
-                  fast->answer + size * k, d->count);
+    /* What was learned stands for what was expected before the update. By what is expected after
+     * it, a drive that takes strength from a touch would raise its error in each scan. */
     for (uint32_t i = 0; i < d->count; ++i) {
         const eits_real error = fast->error[i], noise = fast_square(fast->sigma);
         const eits_real share = eits_larger(EITS_FAST_BIAS_LEAST, error / (error + noise));

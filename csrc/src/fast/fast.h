@@ -330,9 +330,8 @@ void eits_fast_expect(eits_fast *fast, uint32_t drive);
 /* If the residual of a drive with news equals that of the same rows one scan before, it is an error
  * of the model, not a touch. Then learn it and return 1. */
 int eits_fast_is_known_error(eits_fast *fast, uint32_t drive, eits_real chi2);
-/* Learn the model's error from the residual of the rows after the update; `strength` has the
- * strengths before the update. */
-void eits_fast_learn(eits_fast *fast, uint32_t drive, const eits_real *strength);
+/* Learn the model's error from the residual of the rows after the update. */
+void eits_fast_learn(eits_fast *fast, uint32_t drive);
 void eits_fast_forget_errors(eits_fast *fast, uint32_t drive);
 
 /* ---- tracks.c ---- */

@@ -237,14 +237,11 @@ static int may_learn(const eits_fast *fast)
 static void believe(eits_fast *fast, uint32_t drive, int jumped)
 {
     const uint32_t rows = fast->drive[drive].count;
-    eits_real before[EITS_FAST_MAX_TOUCHES];
-    for (uint32_t k = 0; k < fast->count; ++k)
-        before[k] = fast->state[FAST_SIZE * k + FAST_C];
     learn_gain(fast, rows, jumped);
     const int learns = !jumped && may_learn(fast);
     eits_fast_update(fast, rows);
     if (learns)
-        eits_fast_learn(fast, drive, before);
+        eits_fast_learn(fast, drive);
     if (fast->count == 0)
         eits_fast_forget_errors(fast, drive);
 }
