@@ -1,5 +1,5 @@
-/* What the application and the drivers need of a board: small tables of functions, each with its
- * context pointer.
+/* The interface of a board for the application and the drivers: small tables of functions, each
+ * with its context pointer.
  *
  * A board fills one fw_board and calls fw_run. Nothing above this file knows a register; nothing
  * below it knows a frame.
@@ -23,7 +23,7 @@ typedef enum fw_status {
 /* ---- SPI: 16-bit words, most significant bit first, SCLK idle high, data valid on the falling
  * edge (mode 2); chip select low around each word ---- */
 typedef struct fw_spi_ops {
-    /* returns when the last bit is out */
+    /* returns when the last bit was sent */
     fw_status (*write)(void *ctx, const uint16_t *words, size_t count);
 } fw_spi_ops;
 typedef struct fw_spi {
@@ -46,7 +46,7 @@ typedef struct fw_lines {
  * (drivers/ad9833.h), or the board does it itself ---- */
 typedef struct fw_tone {
     uint32_t millihz; /* rounded; 0: the generator cannot make it */
-    /* by which its phase advances, in 2^-64 turns. The demodulator follows the phase by it. */
+    /* advance of its phase, in 2^-64 turns per us; the demodulator follows the phase with it */
     uint64_t turn_per_us;
 } fw_tone;
 typedef struct fw_generator_ops {
@@ -176,7 +176,7 @@ typedef struct fw_system_ops {
     bool (*analog_supply)(void *ctx); /* +-15 V are there; NULL: the board cannot tell */
 } fw_system_ops;
 
-/* What the start-up code found in memory that survives a reset. */
+/* The information that the start-up code found in memory that survives a reset. */
 typedef struct fw_last_reset {
     uint32_t crash;    /* 1: a processor fault, words as in EITS_FAULT_CRASH */
     uint32_t watchdog; /* 1 */

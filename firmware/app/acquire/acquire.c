@@ -56,8 +56,8 @@ fw_status fw_acquire_stop(fw_acquire *acquire)
     return fw_scan_stop(&acquire->scan);
 }
 
-/* The tone that the settings ask for. A generator that makes it already is left alone, so that it
- * keeps its phase. */
+/* Start the tone that the settings ask for. If the generator already makes it, it is not restarted,
+ * so that it keeps its phase. */
 static fw_status start_generator(fw_acquire *acquire, bool *new_phase)
 {
     const fw_generator *generator = &acquire->board->generator;
@@ -97,7 +97,7 @@ fw_started fw_acquire_start(fw_acquire *acquire, fw_status stopped, const fw_sca
                             fw_frame *frames)
 {
     fw_started started = {.status = stopped};
-    /* multiplexers that may be closed must not meet a running generator */
+    /* the generator must not run while multiplexers may be closed */
     const bool wanted = stopped == FW_OK && table != NULL && fw_current_allowed(acquire->safety);
     acquire->tried_us = fw_now_us(acquire->board);
     const fw_status generator =
@@ -151,7 +151,7 @@ bool fw_acquire_retry_due(const fw_acquire *acquire)
 void fw_acquire_shut_down(fw_acquire *acquire)
 {
     (void)fw_acquire_stop(acquire);
-    acquire->generating = FW_GENERATING_UNKNOWN; /* whatever it is: stop it */
+    acquire->generating = FW_GENERATING_UNKNOWN; /* its state is unknown, so it must be stopped */
     (void)stop_generator(acquire);
 }
 

@@ -17,28 +17,29 @@ typedef struct fw_demodulator {
     uint64_t turn_per_us, turn; /* of the generator, in 2^-64 turns; `turn` at: */
     uint32_t at_us;             /* the last burst */
     float scale;                /* volts at the electrodes per unit of the sums */
-    /* what a constant at mid-scale adds to the sums; 0 for even numbers of samples */
+    /* contribution of a constant at mid-scale to the sums; 0 for even numbers of samples */
     int64_t bias[2];
     int16_t cosine[FW_MAX_SAMPLES], sine[FW_MAX_SAMPLES]; /* times 32767 */
 } fw_demodulator;
 
-/* Whether `samples` at `rate_hz` hold a whole number of periods of an excitation. */
+/* Returns whether `samples` at `rate_hz` hold a whole number of periods of an excitation. */
 bool fw_whole_periods(uint32_t excitation_millihz, uint32_t rate_hz, uint32_t samples);
 
 /* The number of samples nearest to `samples` that holds a whole number of periods, at least one. It
  * may exceed FW_MAX_SAMPLES. */
 uint32_t fw_nearest_integer(uint32_t excitation_millihz, uint32_t rate_hz, uint32_t samples);
 
-/* One step of the converter as a voltage at the electrodes, in nanovolts, rounded. */
+/* Returns one step of the converter as a voltage at the electrodes, in nanovolts, rounded. */
 uint32_t fw_volts_per_code_nv(const fw_capture *capture);
 
-/* What rounding to whole codes alone does to an amplitude (rms, volts), of samples as above.
- * Without other noise every period is rounded alike, so that only its different phases average. */
+/* Returns the rms error of an amplitude, in volts, that rounding to whole codes alone causes; the
+ * arguments are as above. Without other noise every period is rounded in the same way, so that only
+ * the different phases of a period average the error. */
 float fw_rounding_v(uint32_t volts_per_code_nv, uint32_t excitation_millihz, uint32_t rate_hz,
                     uint32_t samples);
 
-/* Tables and scale for bursts of `samples` (whole periods). The phase goes on. Errors:
- * FW_E_ARGUMENT. */
+/* Compute tables and scale for bursts of `samples`, which must be whole periods. The phase
+ * continues. Errors: FW_E_ARGUMENT. */
 fw_status fw_demodulate_setup(fw_demodulator *demodulator, const fw_capture *capture,
                               uint64_t turn_per_us, uint32_t excitation_millihz, uint32_t rate_hz,
                               uint32_t samples);

@@ -1,4 +1,4 @@
-/* What the scan gives to other modules: settings, tables, frames and drives. */
+/* Types that the scan shares with other modules: settings, tables, frames and drives. */
 #ifndef FW_FRAME_H
 #define FW_FRAME_H
 
@@ -37,8 +37,7 @@ typedef struct fw_frame {
     uint8_t *quality;         /* n_rows */
 } fw_frame;
 
-/* What is measured: all rows of a protocol, or those that are left when reciprocals are taken as
- * known. */
+/* The rows that are measured: all rows of a protocol, or one row of each reciprocal pair. */
 typedef struct fw_scan_table {
     const uint8_t *protocol; /* n_rows x 4 */
     uint32_t n_rows;

@@ -1,6 +1,6 @@
-/* One burst of the converter's codes for a fixed row: what bring-up and a maker look at. The first
- * of two bursts is taken of the electrodes before, the second one of those that are joined then, so
- * that its first samples show how they settle. */
+/* One burst of the converter's codes for a fixed row, for bring-up and for makers of boards. Two
+ * bursts are taken: the first one with the electrodes `before`, the second one with the electrodes
+ * that are joined then, so that its first samples show how the voltage settles. */
 #ifndef FW_PROBE_H
 #define FW_PROBE_H
 
@@ -25,14 +25,15 @@ typedef struct fw_probe {
     uint16_t codes[FW_MAX_SAMPLES];
 } fw_probe;
 
-/* The generator, as it should be, and nothing else must be running. Errors: those of the lines and
- * the capture; all electrodes are open then. */
+/* Start a probe. The generator must be in the state that `setup` names, and nothing else may run.
+ * Errors: those of the lines and the capture; all electrodes are then open. */
 fw_status fw_probe_start(fw_probe *probe, const fw_board *board, const fw_probe_setup *setup);
 
-/* Open the electrodes; nothing is measured any more. */
+/* Open the electrodes and end the measurement. */
 void fw_probe_stop(fw_probe *probe);
 
-/* Whether it is under way, and whether the codes are there. */
+/* The first function returns whether the probe is under way, the second whether its codes are
+ * available. */
 bool fw_probe_active(const fw_probe *probe);
 bool fw_probe_done(const fw_probe *probe);
 

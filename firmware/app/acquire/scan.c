@@ -79,7 +79,7 @@ static bool same_drive(const fw_scan *scan, uint32_t row, uint32_t other)
     return a[0] == b[0] && a[1] == b[1];
 }
 
-/* The row at `position` of a frame. */
+/* Return the row at `position` of a frame. */
 static fw_scan_row find_row(const fw_scan *scan, bool full, uint32_t position)
 {
     const uint32_t rows = full ? scan->table.n_rows : scan->table.n_unique;
@@ -99,7 +99,7 @@ static bool is_full(const fw_scan *scan, uint32_t number)
     return every != 0 && number % every == 0;
 }
 
-/* Look up the row after `now`: the switch to it must not wait for that. */
+/* Look up the row after `now` in advance, so that the switch to it is not delayed. */
 static void prepare(fw_scan *scan)
 {
     const bool last = scan->now.last;
@@ -114,7 +114,7 @@ static void switch_to(fw_scan *scan, const fw_scan_row *row)
     scan->switched_us = fw_now_us(scan->board);
 }
 
-/* The drive that ends with the row at `position` has been measured. */
+/* Report that the drive which ends with the row at `position` has been measured. */
 static void report_drive(fw_scan *scan, uint32_t position, uint32_t start_us, bool last)
 {
     const uint32_t first = scan->drive_from, count = position + 1 - first;
@@ -140,14 +140,14 @@ static void report_drive(fw_scan *scan, uint32_t position, uint32_t start_us, bo
     scan->drive_done(scan->user);
 }
 
-/* Whether the next frame measures all rows. */
+/* Decide whether the next frame measures all rows. */
 static void plan_frame(fw_scan *scan)
 {
     scan->next_full = is_full(scan, scan->next_number);
 }
 
-/* A free frame begins with the burst that began at start_us. Returns false if none is free, or if
- * it is not due yet. */
+/* Begin a free frame with the burst that began at start_us. Returns false if no frame is free, or
+ * if it is not due yet. */
 static bool begin_frame(fw_scan *scan, uint32_t start_us)
 {
     uint32_t filled = atomic_load_explicit(&scan->filled, memory_order_relaxed);

@@ -61,19 +61,19 @@ typedef struct fw_scan {
 
 void fw_scan_init(fw_scan *scan, const fw_board *board, fw_demodulator *demodulator);
 
-/* Whether the board can join these electrodes: I+, I-, V+, V- of 8 bits each, I+ lowest. */
+/* Return whether the board can join these electrodes: I+, I-, V+, V- of 8 bits each, I+ lowest. */
 bool fw_can_join(const fw_board *board, uint32_t electrodes);
 
-/* Length of a burst, and of a slot. A slot holds burst, settling and switching. If that makes it at
- * most a quarter longer, it is rounded up to a whole number of excitation periods. */
+/* Return the length of a burst, and of a slot. A slot holds burst, settling and switching. If that
+ * makes it at most a quarter longer, it is rounded up to a whole number of excitation periods. */
 uint32_t fw_burst_us(const fw_scan_settings *settings);
 uint32_t fw_slot_us(const fw_scan_settings *settings);
 
-/* Number of rows in the next frame, and the row that is measured at `position` of it. */
+/* Return the number of rows in the next frame, and the row that is measured at `position` of it. */
 uint32_t fw_scan_next_rows(const fw_scan *scan);
 uint32_t fw_scan_row_at(const fw_scan *scan, uint32_t position);
 
-/* Rows measured in the longest frame. */
+/* Return the number of rows that the longest frame measures. */
 uint32_t fw_scan_rows(const fw_scan_settings *settings, const fw_scan_table *table);
 
 /* Set up the capture, which must have been stopped. Errors: those of the capture. */
@@ -89,16 +89,16 @@ fw_status fw_scan_start(fw_scan *scan, const fw_scan_settings *settings, const f
  * lines. */
 fw_status fw_scan_stop(fw_scan *scan);
 
-/* The oldest full frame, or NULL. It belongs to the caller until fw_scan_release. */
+/* Return the oldest full frame, or NULL. It belongs to the caller until fw_scan_release. */
 fw_frame *fw_scan_take(fw_scan *scan);
 void fw_scan_release(fw_scan *scan);
 
-/* The oldest drive that was not taken, or NULL. While FW_SCAN_DRIVES of them wait, further ones are
- * left out. */
+/* Return the oldest drive that was not taken, or NULL. While FW_SCAN_DRIVES of them wait, further
+ * ones are left out. */
 const fw_scan_drive *fw_scan_next_drive(const fw_scan *scan);
 void fw_scan_take_drive(fw_scan *scan);
 
-/* Whether the scan runs, but no burst has come for four slots and 20 ms. */
+/* Return whether the scan runs but no burst has come for four slots and 20 ms. */
 bool fw_scan_stalled(fw_scan *scan, uint32_t now_us);
 
 #endif

@@ -1,4 +1,5 @@
-/* What the acquire module keeps. Besides its own files only app/instrument.h may include this. */
+/* The state of the acquire module. Besides its own files only app/instrument.h may include this
+ * file. */
 #ifndef FW_ACQUIRE_STATE_H
 #define FW_ACQUIRE_STATE_H
 

@@ -35,7 +35,7 @@ static fw_answer ok(void)
     return (fw_answer){0};
 }
 
-/* RANGE where a field, at `offset` in the payload, is not between low and high. */
+/* If a field, at `offset` in the payload, is not between low and high, the answer is RANGE. */
 static bool outside(fw_answer *out, size_t offset, uint32_t value, uint32_t low, uint32_t high)
 {
     if (value >= low && value <= high)
@@ -321,7 +321,7 @@ static fw_answer on_keepalive(fw_host_link *link, const void *payload, size_t si
     return (fw_answer){.later = true};
 }
 
-/* The same of a number that may also be 0, as designed, or EITS_KEPT. */
+/* The same for a number that may also be 0 (as designed) or EITS_KEPT. */
 static bool setting_outside(fw_answer *out, size_t offset, uint32_t value, uint32_t low,
                             uint32_t high)
 {
@@ -341,7 +341,7 @@ static bool settings_outside(fw_host_link *link, const eits_command_settings *c,
                          EITS_NAME_CHARACTERS);
         return true;
     }
-    /* so much is safe at the excitation in use, and at the one after a restart */
+    /* the current that is safe both at the present excitation and at the one after a restart */
     const uint32_t safe_ua =
         (uint32_t)((uint64_t)fw_acquire_settings(link->acquire)->excitation_millihz * 141u /
                    1000000u);
@@ -374,7 +374,7 @@ static fw_answer on_settings(fw_host_link *link, const void *payload, size_t siz
     if (fw_owner_save(link->safety, &wanted) != FW_OK)
         return fw_refuse(EITS_REPLY_FLASH, 0, 0);
     if (fw_owner_capture(link->safety).front_end_gain_ppm != before.front_end_gain_ppm)
-        fw_solve_scan_changed(link->solve); /* the reference is of other volts */
+        fw_solve_scan_changed(link->solve); /* the reference has another scale */
     if ((c.settings & EITS_SETTING_KEEP_CURRENT) != 0)
         (void)fw_current_on(link->safety);
     return ok();
@@ -427,7 +427,7 @@ static fw_answer on_probe(fw_host_link *link, const void *payload, size_t size)
     return (fw_answer){.later = true};
 }
 
-/* A command may be refused during a tare, or an upload. */
+/* Rules by which a command is rejected during a tare or an upload. */
 enum { NOT_IN_TARE = 1, NOT_IN_UPLOAD = 2, MORE_BYTES = 4 };
 
 typedef struct command {
@@ -480,7 +480,7 @@ static fw_answer dispatch(fw_host_link *link, const eits_link_packet *packet)
     return fw_refuse(EITS_REPLY_UNKNOWN_COMMAND, 0, 0);
 }
 
-/* A command that was answered, or that is under way, is not run again. */
+/* Returns whether a command was answered already, or is under way, and must not run again. */
 static bool sent_again(fw_host_link *link, eits_packet_type type, uint32_t request)
 {
     const eits_packet_reply *last = &link->replies.reply;

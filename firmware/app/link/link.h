@@ -1,4 +1,4 @@
-/* The host: reads commands, and sends what is streamed and reported. */
+/* The link to the host: reads commands, and sends streams and reports. */
 #ifndef FW_LINK_H
 #define FW_LINK_H
 
@@ -10,11 +10,12 @@ typedef struct fw_safety fw_safety;
 typedef struct fw_acquire fw_acquire;
 typedef struct fw_solve fw_solve;
 
-/* Packets can be sent from here on. The other modules may be initialised later. */
+/* Initialise the link; packets can be sent afterwards. The other modules may be initialised later.
+ */
 void fw_link_init(fw_host_link *link, const fw_board *board, fw_safety *safety, fw_acquire *acquire,
                   fw_solve *solve);
 
-/* Take what has come, and run the commands in it. Returns false if nothing has come. */
+/* Take the received bytes, and run the commands in them. Returns false if no bytes have come. */
 bool fw_link_read(fw_host_link *link);
 
 /* Call once per turn of the main loop. */

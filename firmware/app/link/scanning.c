@@ -12,7 +12,7 @@
 
 enum { PROBE_US = 500000 }; /* more than two bursts of 1024 samples and 50 ms of settling take */
 
-/* A tare that cannot go on is answered. */
+/* Answer a tare that cannot continue. */
 static void fail_tare(fw_host_link *link)
 {
     const int32_t why = EITS_E_REFERENCE_SHORT;

@@ -1,5 +1,5 @@
-/* Starts the scan where it is wanted, and stops it where it is not, with all that hangs on it: a
- * tare under way, the tracker, the phase. */
+/* Starts the scan when it is needed, and stops it when it is not, together with everything that
+ * depends on it: a running tare, the tracker, the phase. */
 #ifndef FW_SCANNING_H
 #define FW_SCANNING_H
 

@@ -4,7 +4,8 @@
 
 enum { BLOCK = 64, ROUNDS = 64, LENGTH_AT = 56 };
 
-/* Of the cube roots of the first 64 primes, and of the square roots of the first 8 (4.2.2, 5.3.3).
+/* The constants are the fractional parts of the cube roots of the first 64 primes and of the square
+ * roots of the first 8 (FIPS 180-4, 4.2.2 and 5.3.3).
  */
 static const uint32_t K[ROUNDS] = {
     0x428a2f98u, 0x71374491u, 0xb5c0fbcfu, 0xe9b5dba5u, 0x3956c25bu, 0x59f111f1u, 0x923f82a4u,

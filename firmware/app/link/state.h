@@ -1,4 +1,5 @@
-/* What the link module keeps. Besides its own files only app/instrument.h may include this. */
+/* The state of the link module. Besides its own files only app/instrument.h may include this file.
+ */
 #ifndef FW_LINK_STATE_H
 #define FW_LINK_STATE_H
 
@@ -18,14 +19,15 @@ typedef struct fw_stream {
     uint32_t phase; /* frames until the next one that is streamed */
 } fw_stream;
 
-/* Of the frame under way, as events come and as they are sent: too large for the stack. */
+/* The events of the present frame, as the core gives them and as they are sent. They are too large
+ * for the stack. */
 typedef struct fw_events {
     eits_gestures gestures;
     eits_event found[EITS_MAX_EVENTS];
     eits_packet_event sent[EITS_MAX_EVENTS];
 } fw_events;
 
-/* Touches after each drive. What is volatile is shared with the interrupts' work. */
+/* Touches after each drive. The volatile fields are shared with the work of interrupts. */
 typedef struct fw_tracks {
     volatile bool held;
     bool working;
@@ -39,7 +41,7 @@ typedef struct fw_upload {
     uint32_t last_us; /* of its last command */
 } fw_upload;
 
-/* The last replies, to be given again when their command is sent again. */
+/* The last replies, which are repeated if their command is sent again. */
 typedef struct fw_replies {
     bool answered, tare_answered, stats_answered;
     eits_packet_reply reply, tare;

@@ -29,7 +29,7 @@ static void send_raw(fw_host_link *link, const fw_frame *frame, uint32_t flags)
                                5 * (size_t)rows);
 }
 
-/* Whether this frame is one of those that are streamed. */
+/* Return whether this frame is streamed. */
 static bool due(fw_stream *stream)
 {
     if (stream->what == 0)
@@ -79,7 +79,7 @@ static void send_solved(fw_host_link *link, const fw_frame *frame, eits_packet_s
     }
 }
 
-/* The events of a frame; a frame that the core has rejected has none. */
+/* Send the events of a frame; a frame that the core has rejected has none. */
 static void send_events(fw_host_link *link, const fw_frame *frame, eits_status status,
                         const eits_touch *touches, uint32_t count)
 {
@@ -121,8 +121,8 @@ static uint32_t solve(fw_host_link *link, const fw_frame *frame, const float *vo
     return solve_us + touch_us;
 }
 
-/* A frame that must not be solved has the touches that drives follow, and the solver's image of the
- * frame before. */
+/* Stream a frame that must not be solved: it has the touches that drives follow, and the solver's
+ * image of the frame before. */
 static void follow(fw_host_link *link, const fw_frame *frame)
 {
     fw_solved solved;

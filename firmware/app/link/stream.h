@@ -6,13 +6,13 @@
 
 typedef struct fw_host_link fw_host_link;
 
-/* Check a frame, give it to the tare or the solver, and send what is streamed. */
+/* Check a frame, pass it to the tare or the solver, and send the streamed packets. */
 void fw_stream_frame(fw_host_link *link, fw_frame *frame);
 
 /* Stream nothing, as after a start. */
 void fw_stream_reset(fw_host_link *link);
 
-/* There is another reference than before: fingers and faults of the old one are forgotten. */
+/* Call this after the reference has changed: fingers and faults of the old one are forgotten. */
 void fw_reference_changed(fw_host_link *link);
 
 #endif

@@ -51,7 +51,7 @@ static void send(fw_host_link *link, const fw_scan_drive *drive, const fw_track_
                            update->count * sizeof body[0]);
 }
 
-/* No packet says again that there are no touches. */
+/* A packet without touches is sent only once in a row. */
 static void track(fw_host_link *link, const fw_scan_drive *drive)
 {
     fw_track_update update;
@@ -64,7 +64,7 @@ static void track(fw_host_link *link, const fw_scan_drive *drive)
     link->tracks.reported = update.count;
 }
 
-/* Runs between the interrupts and the main loop, and where the main loop itself calls go_on. */
+/* This runs between the interrupts and the main loop, and when the main loop itself calls go_on. */
 static void work(void *user)
 {
     fw_host_link *link = user;
@@ -84,7 +84,7 @@ static void work(void *user)
     tracks->working = false;
 }
 
-/* There may be drives that wait. */
+/* Process drives that may be waiting. */
 static void go_on(void *user)
 {
     const fw_host_link *link = user;

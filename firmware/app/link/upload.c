@@ -17,7 +17,7 @@ static void pause_scan(fw_host_link *link)
     fw_scanning_restart(link); /* stops it, and the generator */
 }
 
-/* The model in use is scanned again. */
+/* End the upload, and scan the model in use again. */
 static void leave(fw_host_link *link)
 {
     link->upload.active = false;
@@ -94,7 +94,7 @@ fw_answer fw_upload_commit(fw_host_link *link)
     if (!upload->begun || upload->offset != upload->bytes)
         return fw_refuse(EITS_REPLY_OFFSET, upload->begun ? (int32_t)upload->offset : -1, 0);
     pause_scan(link);
-    upload->begun = false; /* however it ends, it is not resumed */
+    upload->begun = false; /* the upload is not resumed, however the commit ends */
     fw_answer answer = {0};
     answer.status =
         fw_models_try(link->solve, upload->bank, upload->bytes, upload->crc, answer.detail);

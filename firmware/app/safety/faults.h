@@ -16,13 +16,13 @@ typedef struct fw_fault_detail {
     const uint32_t *words; /* 5, or NULL */
 } fw_fault_detail;
 
-/* The frame that is processed from now on: reports of faults name it. */
+/* Set the number of the frame that is processed from now on; reports of faults name it. */
 void fw_faults_at_frame(fw_safety *safety, uint32_t frame);
 
-/* The fault is there, or is not; reported if that is a change. */
+/* Set whether the fault is present. A change is reported. */
 void fw_fault_set(fw_safety *safety, eits_fault code, bool there, fw_fault_detail detail);
 
-/* A frame shows the fault, or does not. The fault is raised at once; from ELECTRODE_NOISY on only
+/* Note whether a frame shows the fault. The fault is raised at once; from ELECTRODE_NOISY on only
  * by the EITS_FAULT_RAISE_FRAMES-th consecutive frame that shows it. It is cleared by the
  * EITS_FAULT_CLEAR_FRAMES-th consecutive frame that does not. So a fault that flickers with the
  * noise does not fill the link. */
@@ -31,7 +31,7 @@ void fw_fault_observe(fw_safety *safety, eits_fault code, bool shown, fw_fault_d
 /* Bit k: fault number k is raised. */
 uint32_t fw_faults_raised(const fw_safety *safety);
 
-/* Clear all of them; those that are still there are raised again. */
+/* Clear all faults; those that persist are raised again. */
 void fw_faults_clear(fw_safety *safety);
 
 #endif

@@ -13,7 +13,7 @@ bool fw_owner_keeps_current(const fw_safety *safety)
     return (safety->owner.settings & EITS_SETTING_KEEP_CURRENT) != 0;
 }
 
-/* A board that does not know its source or gain as designed takes no others. */
+/* A board that does not know its designed source or gain does not accept other values. */
 uint32_t fw_owner_source_ua(const fw_safety *safety)
 {
     const uint32_t designed = safety->board->source_ua;

@@ -1,5 +1,5 @@
-/* Whether current may flow, the owner's settings, and the list of faults. This module knows no
- * other module: it reports through two functions that are given here. */
+/* The permission for current, the owner's settings, and the list of faults. This module uses no
+ * other module: it reports through the two functions below. */
 #ifndef FW_SAFETY_H
 #define FW_SAFETY_H
 
@@ -16,7 +16,8 @@ typedef struct fw_safety_hooks {
     void *user;
 } fw_safety_hooks;
 
-/* No current is allowed, no fault is raised; the owner's settings are loaded from flash. */
+/* Initialise the module: current is not allowed, no fault is raised, and the owner's settings are
+ * loaded from flash. */
 void fw_safety_init(fw_safety *safety, const fw_board *board, fw_safety_hooks hooks);
 
 #endif

@@ -1,4 +1,5 @@
-/* What the safety module keeps. Besides its own files only app/instrument.h may include this. */
+/* The state of the safety module. Besides its own files only app/instrument.h may include this
+ * file. */
 #ifndef FW_SAFETY_STATE_H
 #define FW_SAFETY_STATE_H
 

@@ -17,7 +17,7 @@ void fw_diagnostics_open(fw_safety *safety, uint64_t open)
     report_electrodes(safety, EITS_FAULT_ELECTRODE_OPEN, open, (fw_fault_detail){0});
 }
 
-/* The only bit other than e; -1 if there is not exactly one. */
+/* Return the only bit other than e, or -1 if there is not exactly one. */
 static int32_t partner(uint64_t which, uint32_t e)
 {
     const uint64_t others = which & ~((uint64_t)1 << e);

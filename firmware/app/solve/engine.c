@@ -29,7 +29,7 @@ static void *take(uint8_t **next, size_t bytes)
     return taken;
 }
 
-/* The tracker of touches, if there is room for it beside all the rest. */
+/* Set up the tracker of touches, if there is enough memory for it. */
 static void start_fast(fw_engine *engine, uint8_t *next)
 {
     const size_t bytes = EITS_ALIGN16(eits_fast_size(&engine->model));
@@ -73,8 +73,8 @@ static void lay_out(fw_engine *engine)
     start_fast(engine, next);
 }
 
-/* Rows that are not the second row of a fold, in the order of measurement. Rows without a fold are
- * among them. */
+/* List the rows that are not the second row of a fold, in the order of measurement. Rows without a
+ * fold are included. */
 static void list_unique(fw_engine *engine)
 {
     const eits_model *model = &engine->model;

@@ -38,7 +38,7 @@ typedef struct fw_engine {
 
 void fw_engine_init(fw_engine *engine, void *workspace, size_t workspace_bytes);
 
-/* Workspace that a model needs, with its frames. */
+/* Returns the workspace that a model needs, including its frames, in bytes. */
 size_t fw_engine_needs(const eits_model *model);
 
 /* Use an open model, which is copied, with its default options and tracking. There is no reference
@@ -47,10 +47,11 @@ size_t fw_engine_needs(const eits_model *model);
 eits_status fw_engine_open(fw_engine *engine, const eits_model *model);
 void fw_engine_close(fw_engine *engine);
 
-/* The least noise of a row, in volts, for the open model and for those that are opened later. */
+/* Set the least noise of a row, in volts, for the open model and for models that are opened later.
+ */
 void fw_engine_set_noise_floor(fw_engine *engine, float volts);
 
-/* The table that the scan measures. */
+/* Returns the table that the scan measures. */
 fw_scan_table fw_engine_table(const fw_engine *engine);
 
 /* Save and restore the reference, options, masks and angle. Restoring forgets the warm start. */

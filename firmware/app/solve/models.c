@@ -12,7 +12,7 @@ static eits_reply_status refuse(eits_reply_status why, size_t a, size_t b, int32
     return why;
 }
 
-/* Whether a model can be scanned here, and whether its packets and its memory fit. */
+/* Return whether the board can scan a model, and whether its packets and its memory fit. */
 static eits_reply_status fits(const fw_solve *solve, const eits_model *model, int32_t detail[2])
 {
     const size_t raw = sizeof(eits_packet_raw) + 5 * (size_t)model->n_rows;

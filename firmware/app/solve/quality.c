@@ -8,7 +8,7 @@ enum {
     UNUSABLE = FAILED | EITS_QUALITY_OPEN | EITS_QUALITY_MASKED
 };
 
-/* rms of the voltages that the model expects, over all rows that have a fold. */
+/* Return the rms of the voltages that the model expects, over all rows that have a fold. */
 static float rms_expected(const eits_model *model)
 {
     float sum = 0;
@@ -126,7 +126,7 @@ static void check_reciprocity(const fw_engine *engine, fw_frame *frame, fw_quali
     quality->worst_permille = (uint32_t)(1000 * (worst < 1000 ? worst : 1000) + 0.5f);
 }
 
-/* The second row of a fold gets the value of the first. */
+/* Copy the value of each fold's first row to its second row. */
 static void copy_reciprocals(const fw_engine *engine, fw_frame *frame)
 {
     for (uint32_t k = 0; k < engine->model.n_folded; ++k) {

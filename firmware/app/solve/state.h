@@ -1,4 +1,5 @@
-/* What the solve module keeps. Besides its own files only app/instrument.h may include this. */
+/* The state of the solve module. Besides its own files only app/instrument.h may include this file.
+ */
 #ifndef FW_SOLVE_STATE_H
 #define FW_SOLVE_STATE_H
 
@@ -17,7 +18,7 @@ typedef struct fw_tare {
     uint32_t since_us; /* frames whose scan began earlier do not count as untouched */
 } fw_tare;
 
-/* Touches after each drive. What is volatile is shared with the interrupts' work. */
+/* Touches after each drive. The volatile fields are shared with the work of interrupts. */
 typedef struct fw_tracker {
     volatile bool owed;              /* drives wait until frame number owed_frame is aligned */
     volatile bool at_frame;          /* the main loop has a frame */
@@ -26,7 +27,7 @@ typedef struct fw_tracker {
     uint32_t next_first, next_frame; /* of the next drive */
     bool noted;                      /* `touches` are news to the tracker */
     uint32_t count;
-    eits_touch touches[EITS_MAX_TOUCHES]; /* that the solver found in the last frame it had */
+    eits_touch touches[EITS_MAX_TOUCHES]; /* touches that the solver found in its last frame */
 } fw_tracker;
 
 struct fw_solve {

@@ -21,10 +21,10 @@ typedef struct fw_record {
     uint32_t crc; /* of the 28 bytes before */
 } fw_record;
 
-/* Most bytes of a model. */
+/* Returns the maximum number of bytes of a model. */
 uint32_t fw_store_room(const fw_store *store);
 
-/* The record of a bank; false if it is not valid. The model is not checked. */
+/* Read the record of a bank. Returns false if it is not valid. The model is not checked. */
 bool fw_store_record(const fw_store *store, uint32_t bank, fw_record *record);
 
 /* Open the model of a bank. Errors: EITS_E_MODEL_CRC if it does not match the record,
@@ -32,7 +32,7 @@ bool fw_store_record(const fw_store *store, uint32_t bank, fw_record *record);
 eits_status fw_store_open(const fw_store *store, uint32_t bank, const fw_record *record,
                           eits_model *model);
 
-/* Banks with a valid record, the newest first; returns their number. */
+/* List the banks with a valid record, the newest first. Returns their number. */
 uint32_t fw_store_newest(const fw_store *store, uint32_t banks[FW_BANKS]);
 
 /* Make a bank valid, as the last step. Errors: those of programming; FW_E_FLASH if the record does

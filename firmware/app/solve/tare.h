@@ -1,5 +1,5 @@
-/* Learning the reference from untouched frames. Until a tare is done, the last reference stays; if
- * the tare fails, it comes back. */
+/* A tare learns the reference from untouched frames. If it fails, the last reference is restored.
+ */
 #ifndef FW_TARE_H
 #define FW_TARE_H
 
@@ -20,24 +20,26 @@ typedef enum fw_tare_step {
     FW_TARE_FAILED /* status says why; the last reference is back */
 } fw_tare_step;
 
-/* `frames`: 1, or 4 to FW_TARE_MAX. */
+/* Begin a tare. `frames` is 1, or 4 to FW_TARE_MAX. */
 void fw_tare_begin(fw_solve *solve, uint32_t request, uint32_t frames);
 
 bool fw_tare_active(const fw_solve *solve);
 uint32_t fw_tare_request(const fw_solve *solve); /* of the last one that was begun */
 
-/* Whether the frame belongs to the tare, and whether no frame has been taken for it yet. */
+/* The first function returns whether the frame belongs to the tare, the second whether no frame has
+ * been taken for it yet. */
 bool fw_tare_wants(const fw_solve *solve, const fw_frame *frame);
 bool fw_tare_first(const fw_solve *solve);
 
 /* Take a checked frame. */
 fw_tare_step fw_tare_add(fw_solve *solve, const fw_frame *frame, eits_status *status);
 
-/* Give up: the last reference is back. Returns whether a tare was active. */
+/* End the tare without a result; the last reference is restored. Returns whether a tare was active.
+ */
 bool fw_tare_abort(fw_solve *solve);
 
-/* Bring back the reference that the last tare replaced. Returns false if it is not kept: there was
- * none, it has been brought back already, or scan, model or masks have changed since. */
+/* Restore the reference that the last tare replaced. Returns false if it is not available: there
+ * was none, it has been restored already, or scan, model or masks have changed since. */
 bool fw_tare_undo(fw_solve *solve);
 
 #endif

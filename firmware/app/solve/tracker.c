@@ -40,7 +40,8 @@ void fw_tracker_skip(fw_solve *solve)
     solve->tracker.running = false;
 }
 
-/* The model's drive that has exactly these rows; the number of drives if there is none. */
+/* Return the model's drive that has exactly these rows, or the number of drives if there is none.
+ */
 static uint32_t number_of(const fw_solve *solve, const fw_scan_drive *drive)
 {
     const fw_engine *engine = &solve->engine;

@@ -54,7 +54,7 @@ static size_t read_bytes(void *ctx, uint8_t *bytes, size_t room)
 
 const fw_link_ops example_link_ops = {write_bytes, read_bytes, NULL};
 
-/* For the sampling of boards/mps2_an500, whose link is a file. */
+/* This function is needed by the sampling of boards/mps2_an500, whose link is a file. */
 bool mps2_link_ended(void *ctx)
 {
     (void)ctx;

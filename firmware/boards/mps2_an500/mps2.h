@@ -37,20 +37,20 @@ void mps2_unlock(void *ctx, uint32_t state);
 void mps2_wake(void);
 void mps2_wait(void *ctx); /* until mps2_wake, or at most 1 ms */
 void mps2_timebase_start(void);
-/* Work of the simulated world takes no board time: between these two calls the board's timers stand
+/* The work of the simulation takes no board time: between these two calls the board's timers stand
  * still. */
 void mps2_hold_time(void);
 void mps2_release_time(void);
-/* Timer 1 ends a burst so many ticks from now, or from when time goes on. */
+/* Let timer 1 end a burst after `ticks` from now, or from the moment when time continues. */
 void mps2_start_slot_timer(uint32_t ticks);
 
-/* The whole of a file into `bytes`; 0 if there is none. Ends the program if it is longer than
- * `room`. */
+/* Read a whole file into `bytes`. Returns its length, or 0 if there is no such file. Ends the
+ * program if it is longer than `room`. */
 size_t mps2_load(const char *name, void *bytes, size_t room);
 __attribute__((noreturn)) void mps2_fail(const char *what);
 
 void mps2_skin_start(void);
-/* The codes of a burst, from the skin, the multiplexers and the generator. */
+/* Compute the codes of a burst from the skin, the multiplexers and the generator. */
 void mps2_skin_burst(uint16_t *codes, uint32_t samples, uint32_t sample_rate_hz, uint32_t start_us,
                      uint32_t scanning_us);
 void mps2_link_start(void);

@@ -73,7 +73,8 @@ void mps2_wake(void)
     woken = true;
 }
 
-/* Not WFI: while the processor sleeps, QEMU's clock follows the host's, and runs would differ. */
+/* WFI is not used: while the processor sleeps, QEMU's clock follows the host's, and runs would
+ * differ. */
 void mps2_wait(void *ctx)
 {
     const uint32_t start = mps2_time_us(ctx);

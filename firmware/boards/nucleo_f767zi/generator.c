@@ -44,7 +44,8 @@ static fw_status write_words(void *ctx, const uint16_t *words, size_t count)
             SPI_DR(SPI3_BASE) = words[k];
         else
             status = FW_E_TIMEOUT;
-        /* What was written is out when the FIFO is empty and then the shifter idle (RM0410 35.5.9).
+        /* All words have been sent when the FIFO is empty and the shifter is idle after that
+         * (RM0410 35.5.9).
          */
         if (!status_becomes(queued, 0) || !status_becomes(SPI_SR_BSY, 0))
             status = FW_E_TIMEOUT;

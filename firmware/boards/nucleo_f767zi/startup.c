@@ -1,4 +1,4 @@
-/* From reset to main: vectors, the stack painted, FPU, .data and .bss. */
+/* From reset to main: vectors, the painted stack, FPU, .data and .bss. */
 #include "nucleo.h"
 
 extern uint32_t data_start[], data_end[], data_load[], bss_start[], bss_end[], dtcm_start[],

@@ -4,7 +4,8 @@
 
 enum { LED_GREEN = 0, LED_BLUE = 7, LED_RED = 14 }; /* of port B: LD1, LD2, LD3 (UM1974 6.5) */
 
-/* If the main loop makes no turn for so long, the multiplexers open, or the board restarts. */
+/* If the main loop makes no turn for STALLED_MS, the multiplexers open; after HUNG_MS the board
+ * restarts. */
 enum { STALLED_MS = 900, HUNG_MS = 8000, BUTTON = 13, SUPPLY_GOOD = 11 };
 /* Reload values at 32 kHz (17 to 47 by the data sheet): 0.5 s (at most 0.94) by a divider of 4, 8 s
  * by 64, more than the longest erase of a sector (4 s), during which the program stands still. */
@@ -78,7 +79,7 @@ void nucleo_system_start(void)
     set_brown_out(); /* before the watchdog: it takes as long as the erase of a sector */
 
     /* While a debugger halts the processor the watchdog stands still: it would reset what is looked
-     * at. The current flows on then; docs/guide/board.md says so. */
+     * at. The current continues to flow then, as docs/guide/board.md warns. */
     DBGMCU_APB1FZ |= DBGMCU_APB1FZ_IWDG_STOP;
     IWDG_KR = 0xCCCCu;
     IWDG_KR = 0x5555u;

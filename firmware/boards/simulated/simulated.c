@@ -153,7 +153,7 @@ static fw_status start(void *ctx)
 {
     sim_board *sim = ctx;
     sim_converter *converter = &sim->converter;
-    /* 2^28 times mclk / rate, of which the generator's phase takes `tuning` a sample */
+    /* the advance of the generator's phase per second, in units of 2^-28 turns */
     const uint64_t turn = (uint64_t)sim->generator.tuning * MCLK_HZ;
     for (uint32_t k = 0; k < converter->setup.samples; ++k) {
         const uint64_t phase = turn * k / converter->setup.sample_rate_hz;
@@ -186,7 +186,7 @@ static void convert(sim_board *sim, float volts)
     }
 }
 
-/* Time passes only while the host reads, so it is present. */
+/* Time passes only while the host reads, so the host is present. */
 static void listen(sim_board *sim)
 {
     drive_monitor_heard(&sim->monitor, now_ns(sim));

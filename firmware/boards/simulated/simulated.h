@@ -1,9 +1,9 @@
 /* The board behind `sim:SCENE`: the firmware's own application, with simulated parts.
  *
- * From what the drivers write to the generator and the multiplexers, this decodes which electrodes
- * are connected (up to 64 can be), and at which frequency. The converter has 16 bits and no noise;
- * its range is that of the frames that are shown, and 1 uV until then. It measures frames that the
- * host has simulated. A frame is one scan, and it is chosen when the scan begins.
+ * It decodes which electrodes (up to 64) are connected, and at which frequency, from the writes of
+ * the drivers to the generator and the multiplexers. The converter has 16 bits and no noise; its
+ * range is that of the frames that are shown, and 1 uV until then. It measures frames that the host
+ * has simulated. A frame is one scan, and it is chosen when the scan begins.
  *
  * Time is counted, not waited for: it passes only in sim_scan_frame, and the processor's work takes
  * none. Everything is in the caller's memory, so one process can have many boards. A board may also
@@ -82,28 +82,28 @@ typedef struct sim_setup {
     size_t workspace_bytes;
 } sim_setup;
 
-/* Bytes of a board, whose memory must be aligned to 16. */
+/* Returns the bytes of a board, whose memory must be aligned to 16. */
 size_t sim_board_bytes(void);
 
-/* A board at time 0 on what its banks hold, switched on. */
+/* Make a board with the content of its banks, at time 0 and switched on. */
 void sim_init(sim_board *sim, const sim_setup *setup);
 
-/* Off and on again: time goes on, banks and skin stay. */
+/* Switch the board off and on again: time continues, and banks and skin stay. */
 void sim_start(sim_board *sim);
 
 /* Give the board bytes from the host; it runs the commands in them. */
 void sim_write(sim_board *sim, const uint8_t *bytes, size_t size);
 
-/* Take what the board has sent, at most `room` bytes; returns how many. */
+/* Take at most `room` bytes that the board has sent. Returns their number. */
 size_t sim_read(sim_board *sim, uint8_t *bytes, size_t room);
 
-/* The first violation of the drivers (drive_monitor.h), as a sentence; NULL: none. */
+/* Returns the first violation of the drivers (drive_monitor.h), as a sentence; NULL: none. */
 const char *sim_violation(const sim_board *sim);
 
 /* The owner holds the blue button, or releases it. */
 void sim_press(sim_board *sim, bool held);
 
-/* Whether the board scans for someone: a stream or a tare waits for frames. */
+/* Returns whether a stream or a tare waits for frames. */
 bool sim_wants_frame(const sim_board *sim);
 bool sim_tares(const sim_board *sim); /* a tare does */
 
@@ -111,7 +111,7 @@ bool sim_tares(const sim_board *sim); /* a tare does */
  * its first frame. Returns whether it was left out before. */
 bool sim_mask_row(sim_board *sim, uint32_t row, bool masked);
 
-/* The open model, its length and its CRC-32; NULL if there is none. */
+/* Returns the open model, with its length and its CRC-32; NULL if there is none. */
 const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc);
 
 /* Put a skin before the board that has a model: first `untouched` frames (at least 1), then
@@ -119,11 +119,12 @@ const uint8_t *sim_model(const sim_board *sim, uint32_t *bytes, uint32_t *crc);
  * sim_scan_frame. */
 void sim_show(sim_board *sim, float largest_v, uint32_t untouched, uint32_t frames, double rate_hz);
 
-/* The `count` frames from `first` on (0: the first untouched one), in the model's rows; they are
- * used until the next call. */
+/* Give the board the `count` frames from `first` on (0: the first untouched one), in the model's
+ * rows; they are used until the next call. */
 void sim_put(sim_board *sim, const float *volts, uint32_t first, uint32_t count);
 
-/* One frame, first, that is shown only in the scan that begins when sim_wanted_s says. */
+/* Give the board the frame `first` alone; it is shown only in the scan that begins at sim_wanted_s.
+ */
 void sim_put_once(sim_board *sim, const float *volts, uint32_t first);
 
 /* The frame that sim_scan_frame needs; when its scan begins, in s after the scene's time 0 (0
@@ -150,7 +151,7 @@ bool sim_scan_frame(sim_board *sim);
  * frame is ignored. */
 void sim_give_frame(sim_board *sim, const float *iq, uint32_t passed_us, uint32_t period_us);
 
-/* On a board with frames_given: passed_us have passed without a frame. */
+/* On a board with frames_given: let passed_us pass without a frame. */
 void sim_let_pass(sim_board *sim, uint32_t passed_us);
 
 #endif
