@@ -84,6 +84,14 @@ def test_replay_shows_what_was_seen_live(done, scene, tmp_path):
     assert lines[:2] == live.splitlines()[:2] and lines[2].startswith("2 frames")
 
 
+def test_a_scene_that_began_again_replays_to_the_end(done, scene, tmp_path):
+    path, frames = tmp_path / "run.eits", 3 * FRAMES
+    live = done(f"stream --device sim:{scene}?loop=1 --frames {frames} --record {path}")
+    assert f"{frames} of {frames} touches found" in live
+    seen, replayed = live.splitlines(), done(f"replay {path}").splitlines()
+    assert replayed[:-2] + replayed[-1:] == seen[:-2] + seen[-1:]  # what the board counted is live
+
+
 def test_gestures_of_a_recording_that_has_touches_alone(done, tmp_path):
     path, tap = tmp_path / "run.eits", ("--device", "sim:tap", "--ignore", "all")
     live = [line for line in done("stream", *tap).splitlines() if "tap" in line]

@@ -134,8 +134,9 @@ def test_a_recording_has_a_timeline_and_can_be_saved(scene, page, tmp_path):
     with Session(f"sim:{scene}?loop=1", SessionSettings(ALL, frames=96, record=path)) as session:
         for _ in session.messages():
             pass
-    with serving(f"file:{path}") as server:
+    with serving(f"file:{path}", speed=0.01) as server:
         page.open(server)
+        server.reader.live().pacer.set_speed(1.0)  # it has not played to its end meanwhile
         until(lambda: page.shown("timeline"))
         length_s = float(page.get("at", "max"))
         assert length_s == pytest.approx(95 / 48, abs=0.01)

@@ -24,6 +24,7 @@ from eitskin.errors import DeviceError, EitskinError, FileError
 from eitskin.fileio import parse_json
 
 FORMAT = "eits"
+LOOP = "?loop=1"  # ends the noted URL of a scene that began again at its end
 VERSION = 1
 CHUNK = 1 << 16
 MAX_HEAD = 4096
@@ -64,7 +65,7 @@ class Recorder:
             "format": FORMAT,
             "version": VERSION,
             "eitskin": __version__,
-            "url": device.transport.url,
+            "url": device.transport.url + _loop_mark(device.transport.capabilities.scene),
             "model_crc": f"{info.model_crc:08x}",
             "sha256": device.hashes().as_dict(),
         }
@@ -209,10 +210,15 @@ def read_head(path: str | Path) -> dict[str, Any]:
 
 def _noted_scene(url: str) -> SimulatedScene | None:
     """The scene before the recorded board; None where the skin was real."""
-    scheme, _, name = url.partition(":")
+    scheme, _, name = url.removesuffix(LOOP).partition(":")
     if scheme not in ("sim", "emu"):
         return None
-    return SimulatedScene(name, held=scheme == "emu", recorded=True)
+    return SimulatedScene(name, held=scheme == "emu", loop=url.endswith(LOOP), recorded=True)
+
+
+def _loop_mark(scene: SimulatedScene | None) -> str:
+    """What follows the URL of a scene that begins again at its end."""
+    return LOOP if scene is not None and scene.loop and not scene.recorded else ""
 
 
 def _noted_hashes(noted: Any) -> BoardHashes:
