@@ -13,8 +13,8 @@ LONGEST, ENDING = 3000, 1000  # characters of a line, and of the end that is kep
 
 
 def printable(text: str) -> str:
-    """``text`` in one line, with escapes in place of what a terminal would obey: names come from
-    boards and files."""
+    """Return ``text`` in one line, with escapes in place of control characters, because names come
+    from boards and files."""
     if text.isprintable():
         return text
     return "".join(one if one.isprintable() else repr(one)[1:-1] for one in text)

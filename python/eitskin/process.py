@@ -11,8 +11,8 @@ class _Process:
 
 
 def take_over() -> None:
-    """This process is eitskin's own: what the user set for other programs is ignored, here and in
-    the processes that are started from here."""
+    """Make this process eitskin's own: settings that the user made for other programs are ignored,
+    here and in child processes."""
     _Process.own = True
     os.environ["MPLBACKEND"] = "agg"
     os.environ.pop("PYTHONWARNINGS", None)

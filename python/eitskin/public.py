@@ -65,8 +65,8 @@ def stream(
     name: str | None = None,
     **solver: Any,
 ) -> Iterator[Frame]:
-    """A skin's frames as they come, touches and all; the board is set up first, its reference taken
-    where that is needed, and let go of where the loop ends.
+    """Yield a skin's frames with their touches as they arrive. The board is set up first, its
+    reference is taken if necessary, and it is released when the loop ends.
 
     Args:
         url: as ``eitskin stream --device``: "auto", "serial:PORT", "sim:SCENE", "emu:SCENE",

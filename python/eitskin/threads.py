@@ -1,4 +1,4 @@
-"""What makes objects safe to share between threads, or lets them refuse clearly
+"""Locks that make objects safe to share between threads, and clear errors where they are not
 (docs/reference/python-api.md, "Threads")."""
 
 import threading
@@ -107,7 +107,7 @@ class OneReader:
             self._reader, self._thread = reader, threading.current_thread()
 
     def go_on(self, reader: object) -> None:
-        """``reader`` goes on, in whatever thread.
+        """Let ``reader`` continue, in any thread.
 
         Raises:
             UsageError: another reader took over.

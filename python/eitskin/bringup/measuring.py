@@ -16,7 +16,7 @@ LEAST_V = 0.004  # five codes: less is no signal
 @dataclass(frozen=True)
 class Level:
     """A burst in volts at the converter: ``mean_v``, the complex ``amplitude_v`` against the
-    board's clock, the rms of what is left (``rest_v``), and the ``span_codes`` from the lowest to
+    board's clock, the rms of the residual (``rest_v``), and the ``span_codes`` from the lowest to
     the highest code. ``clipped``: a code lies at an end of the range."""
 
     mean_v: float
@@ -58,8 +58,8 @@ def frequency_of(burst: ProbedBurst, rate_hz: float) -> float:
 
 
 def settled_us(burst: ProbedBurst, hz: float, rate_hz: float, share: float) -> float:
-    """How long after the switch the amplitude has come to within ``share`` of its last value, by
-    half periods."""
+    """Return the time after the switch until the amplitude is within ``share`` of its last value,
+    by half periods."""
     half = max(round(rate_hz / hz / 2), 2)
     volts = burst.codes.astype(np.float64)
     volts = volts - volts[len(volts) // 2 :].mean()

@@ -1,4 +1,4 @@
-"""All stages in their order, up to the first one that is wrong."""
+"""Run all stages in their order, up to the first one that fails."""
 
 from collections.abc import Iterator
 
@@ -26,9 +26,9 @@ def bring_up(
     first: str = STAGES[0],
     last: str = STAGES[-1],
 ) -> Iterator[StageReport]:
-    """The report of each stage from ``first`` to ``last``; it ends with the first one that is
-    wrong. ``connect`` puts a fixture of ``FIXTURES`` on the electrodes, or has somebody do it;
-    ``number`` and ``done`` ask for what only a person can read or do.
+    """The report of each stage from ``first`` to ``last``; it ends with the first one that fails.
+    ``connect`` puts a fixture of ``FIXTURES`` on the electrodes, or has somebody do it; ``number``
+    and ``done`` ask for what only a person can read or do.
 
     Raises:
         DeviceError: the board does not know PROBE, or sends frames of another instrument.

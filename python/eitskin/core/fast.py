@@ -155,10 +155,11 @@ class FastCore:
 
     @one_at_a_time
     def report(self, found: Sequence[Touch] | None) -> tuple[Touch, ...]:
-        """Return the touches of a frame, the strongest first; ``found``: those that the engine
-        found in it, None where it was not solved. After :meth:`aligned` they are the touches that
-        drives followed then, with what the engine found of them; else those that it found, with
-        ids that follow them from frame to frame. Call this once per frame.
+        """Return the touches of a frame, the strongest first. ``found`` are those that the engine
+        found in it, None if it was not solved. After :meth:`aligned` the result is the touches that
+        drives followed at that time, with the engine's results for them; otherwise it is the
+        touches that the engine found, with ids that follow them from frame to frame. Call this once
+        per frame.
 
         Raises:
             FrameError: there are more touches than the core can report.

@@ -77,7 +77,8 @@ def check_shape(frames: AnyArray, n_rows: int, what: str, least: int = 0) -> Non
 
 
 def frame_numbers(values: npt.ArrayLike, what: str) -> FloatArray:
-    """``values`` as an array; what a numpy mask hides is NaN, which no row can use."""
+    """Return ``values`` as an array; values hidden by a numpy mask become NaN, and their rows are
+    not used."""
     try:
         if isinstance(values, np.ma.MaskedArray):
             return np.where(np.ma.getmaskarray(values), np.nan, np.asarray(values, np.float64))
@@ -209,7 +210,7 @@ class Reconstruction:
 
     @property
     def image(self) -> npt.NDArray[np.floating[Any]]:
-        """The image that shows the frame, (n,) S/m: ``touch_image`` where the touches explain the
+        """The image that shows the frame, (n,) S/m: ``touch_image`` if the touches explain the
         frame, else ``solver_image``; ``image_is`` says which of the two."""
         return self.solver_image if self.touch_image is None else self.touch_image
 

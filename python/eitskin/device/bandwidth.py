@@ -1,4 +1,4 @@
-"""The capacity of a serial line: how many frames of which kinds it carries without drops."""
+"""Compute the capacity of a serial line: the frames of each kind that it carries without drops."""
 
 from math import ceil
 
@@ -50,7 +50,7 @@ def least_every(info: BoardInfo, what: Stream, baud: int) -> int:
 
 
 def carried_every(device: Device, what: Stream) -> int:
-    """As ``least_every``, of the line to ``device``; 1 where no line limits it (simulated boards,
+    """As ``least_every``, for the line to ``device``; 1 if no line limits it (simulated boards,
     recordings)."""
     baud = device.transport.capabilities.baud
     return 1 if baud is None else least_every(device.board, what, baud)

@@ -1,5 +1,5 @@
-"""Whether a board is the one that is meant: versions, model, identity; and why one does not
-answer."""
+"""Check that a board is the intended one (versions, model, identity), and find out why a board does
+not answer."""
 
 import zlib
 from pathlib import Path
@@ -38,7 +38,7 @@ def check_board(info: BoardInfo, name: str) -> None:
 
 
 def no_answer(link: Link, before: LinkCounters, what: str, waited_s: float) -> str:
-    """Why nothing answers, from what was counted since ``before``, in one line."""
+    """Return in one line why the board does not answer, by the counters since ``before``."""
     name, counters = link.transport.name, link.counters
     other = link.decoder.other_version
     packets = counters.packets - before.packets
@@ -132,8 +132,8 @@ def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
 
 
 def model_of(info: BoardInfo, path: str | Path | None, name: str) -> tuple[Model, bytes]:
-    """The board's own model on the host: the file ``path``, or the prebuilt one where that is what
-    the board has."""
+    """Return the board's own model on the host: the file ``path``, or the prebuilt model if the
+    board has that one."""
     model, blob = load_prebuilt() if path is None else load_model(path)
     check_model(info, model, blob, name)
     return model, blob

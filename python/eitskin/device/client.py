@@ -1,5 +1,4 @@
-"""A board's commands with their answers, and what it streams, whatever kind of device is behind
-it."""
+"""A board's commands with their answers, and its streams, for any kind of device."""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import replace
@@ -53,7 +52,8 @@ def _electrodes(row: Sequence[int] | None) -> int:
 
 
 def check_tare_frames(frames: int) -> int:
-    """``frames`` if a board can take its reference from so many frames, else UsageError."""
+    """Return ``frames`` if a board can take its reference from that many frames, else raise
+    UsageError."""
     if frames != 1 and not 4 <= frames <= 1024:
         raise UsageError(f"a tare of {frames} frames cannot be; use 1, or 4 to 1024")
     return frames
@@ -134,8 +134,8 @@ class Device(CommandExchange):
             )
 
     def undo_tare(self) -> None:
-        """Bring back the reference that the last tare replaced; what was solved with the new one
-        stays as it was.
+        """Restore the reference that the last tare replaced; results with the new one do not
+        change.
 
         Raises:
             DeviceError: the board does not keep it: there was none, it has been brought back
@@ -156,8 +156,8 @@ class Device(CommandExchange):
         return unserved(self.board, raw[-1]) if raw else None  # two were measured before
 
     def start_scene(self) -> int | None:
-        """Begin what is to be touched, on a simulated or emulated board; call it after ``tare``.
-        Nothing on a real one. Returns as ``Transport.begin_scene``."""
+        """Begin the touches of the scene on a simulated or emulated board; call it after ``tare``.
+        Does nothing on a real board. Returns as ``Transport.begin_scene``."""
         return self.link.begin_scene()
 
     def scan(
@@ -170,7 +170,7 @@ class Device(CommandExchange):
         check_every: int | None = None,
         frame_period_us: int | None = None,
     ) -> BoardInfo:
-        """Change how frames are scanned; what is not named stays. The reference is forgotten.
+        """Change the scan; settings that are not given stay. The reference is discarded.
 
         Raises:
             UsageError: a number is negative or does not fit its field.

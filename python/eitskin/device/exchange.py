@@ -1,5 +1,5 @@
-"""One command and its answer at a time, sent again where it was lost; what a board streams between
-stays in the link's queue."""
+"""One command and its answer at a time; a command that was lost is sent again. Packets that a board
+streams in between stay in the link's queue."""
 
 import random
 import threading
@@ -125,8 +125,8 @@ class CommandExchange:
         refuse_copy(f"the device {self.transport.name}", "open its URL in the other process")
 
     def record(self, tap: Tap | None) -> None:
-        """Give each packet that is accepted to ``tap`` as it comes, before anything else; None
-        stops that. A ``Recorder`` goes beside it."""
+        """Pass each accepted packet to ``tap`` on arrival, before any other use; None stops that. A
+        ``Recorder`` also works at the same time."""
         if self._tap is not None:
             self.link.end_tap(self._tap)
         self._tap = tap

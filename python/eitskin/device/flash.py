@@ -40,8 +40,8 @@ class FlashPlan:
 
 
 def find_tool(wanted: str | None = None, *, installed: bool = True) -> str:
-    """The programmer's tool: ``wanted``, or the first of ``TOOLS`` that is installed; where it need
-    not be ``installed``, else the first of them."""
+    """Return the programmer's tool: ``wanted``, or the first of ``TOOLS`` that is installed. If
+    none is and it need not be ``installed``, return the first of ``TOOLS``."""
     if wanted is not None and wanted not in TOOLS:
         raise UsageError(f"--tool {wanted}: use one of {', '.join(TOOLS)}")
     choice = [wanted] if wanted else list(TOOLS)

@@ -1,5 +1,5 @@
-"""The firmware's own application, built for this host: what stands behind ``sim:`` boards and
-behind other instruments, whose frames it is given.
+"""The firmware's own application, built for this host. It runs behind ``sim:`` boards, and behind
+other instruments, whose frames it is given.
 
 The parts around it are simulated (firmware/boards/simulated). No processor time passes, so that
 every time that depends on one is 0. Deterministic; no thread.
@@ -78,12 +78,12 @@ class HostBoard:
 
     @property
     def banks(self) -> list[bytes]:
-        """The contents of the flash banks as they are now."""
+        """Return the present contents of the flash banks."""
         return [bytes(cells) for cells in self._banks]
 
     @one_at_a_time
     def restart(self) -> None:
-        """Switch it off and on again: time goes on, the banks stay."""
+        """Switch it off and on again: time continues, and the banks stay."""
         self._lib.sim_start(self._sim)
 
     @one_at_a_time
@@ -127,8 +127,8 @@ class HostBoard:
 
 
 class GivenBoard(HostBoard):
-    """A board that is given the frames of another instrument, of which INFO has no more than
-    ``name``, ``serial`` and how often they come."""
+    """A board that is given the frames of another instrument. Its INFO has only ``name``,
+    ``serial`` and the frame period of that instrument."""
 
     def __init__(self, name: str, serial: str, banks: list[bytes], *, period_us: int) -> None:
         super().__init__(name, serial, banks, period_us=period_us, frames_given=True)
@@ -155,5 +155,5 @@ class GivenBoard(HostBoard):
 
     @one_at_a_time
     def let_pass(self, passed_us: int) -> None:
-        """No frame has come for ``passed_us`` more."""
+        """Let ``passed_us`` pass without a frame."""
         self._lib.sim_let_pass(self._sim, passed_us)

@@ -33,8 +33,8 @@ class KnownModel:
 
 
 def find_model(info: BoardInfo, path: Path | None, name: str) -> KnownModel | None:
-    """The board's model: the file ``path``, or the prebuilt one where that is what the board has;
-    None where it has another."""
+    """Return the board's model: the file ``path``, or the prebuilt model if the board has that one;
+    None if it has another."""
     if path is not None:
         return KnownModel(*model_of(info, path, name))
     model, blob = load_prebuilt()
@@ -43,7 +43,7 @@ def find_model(info: BoardInfo, path: Path | None, name: str) -> KnownModel | No
 
 
 def need_model(info: BoardInfo, path: Path | None, name: str, what: str) -> KnownModel:
-    """As ``find_model``, for ``what``, which cannot do without.
+    """As ``find_model``, but for ``what``, which needs a model: raise an error if it is not known.
 
     Raises:
         FileError, ModelError: the file cannot be read.
@@ -63,8 +63,7 @@ def need_model(info: BoardInfo, path: Path | None, name: str, what: str) -> Know
 
 
 def scanned_protocol(info: BoardInfo, known: KnownModel | None, name: str) -> Protocol:
-    """The protocol that a board scans: its model's, or that of the pattern that has the same
-    hash."""
+    """Return the protocol that a board scans: its model's, or the pattern with the same hash."""
     if known is not None:
         return known.model.protocol
     protocol = scanned(info)

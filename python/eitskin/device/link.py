@@ -105,7 +105,7 @@ class Link(ABC):
 
     @property
     def ended(self) -> bool:
-        """No frame will come again, and nothing is left to fetch."""
+        """Return whether no further frame will come and none is waiting."""
         return self.transport.ended and not self._queue
 
     @property
@@ -249,8 +249,8 @@ class PumpedLink(Link):
                 useless += count or 0
 
     def answer(self, fits: Callable[[Answer], bool], timeout_s: float) -> Answer | None:
-        """As ``Link.answer``; each packet that comes takes a part of ``timeout_s``, so that a board
-        that talks without answering is given up too."""
+        """As ``Link.answer``. Each packet uses up a part of ``timeout_s``, so that a board which
+        sends packets but no answer is given up, too."""
         rest_s = timeout_s - PACKET_S
         while True:
             with self._pumping:
@@ -366,7 +366,7 @@ class ThreadedLink(Link):
 
     @property
     def _over(self) -> bool:
-        """Nothing will come any more."""
+        """Return whether nothing will come any more."""
         return self._failed is not None or self._closed_by is not None
 
     def _raise_failed(self) -> None:

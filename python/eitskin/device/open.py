@@ -41,7 +41,7 @@ def open_device(
     room: int = 1024,
     reconnect: Reconnect | None = None,
 ) -> Device:
-    """The device behind ``url``, asked what it is.
+    """Open the device behind ``url``, and ask it what it is.
 
     ``model`` is put into the bank of a simulated or emulated board (without it, the prebuilt
     model); a real board's and a recording's must be the same. ``image`` is the firmware of an
@@ -202,8 +202,8 @@ class FoundPort:
 
 
 def discover(*, ask: bool = True) -> list[FoundPort]:
-    """All serial ports, boards first; where ``ask``, those that look like a board's are asked what
-    they are."""
+    """Return all serial ports, boards first. With ``ask``, ports that look like a board's are asked
+    what they are."""
     return [_asked(port) if ask and port.is_board else FoundPort(port) for port in list_devices()]
 
 

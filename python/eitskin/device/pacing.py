@@ -81,7 +81,7 @@ class Pacer:
         self._change(paused=True, steps=1)
 
     def jump(self) -> None:
-        """The frames go on at another time; of a pause, one shows where."""
+        """The frames continue at another time; during a pause one frame is shown."""
         with self._changed:
             self._start, self._woken = None, False
             self._steps = 1 if self._paused else 0

@@ -20,8 +20,9 @@ class _Settings:
 
 @dataclass(frozen=True)
 class ScanSettings(_Settings):
-    """How frames are scanned; None stays as it is. ``check_every`` as in ``commands.Scan``: 1 scans
-    every row, n > 1 one of each reciprocal pair with every n-th frame whole, 0 never whole."""
+    """Settings of the scan; None leaves a setting as it is. ``check_every`` is that of
+    ``commands.Scan``: with 1 every row is scanned; with n > 1 one row of each reciprocal pair, and
+    all rows in every n-th frame; with 0 never all rows."""
 
     excitation_hz: float | None = None
     sample_rate_hz: int | None = None

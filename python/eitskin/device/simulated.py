@@ -87,9 +87,9 @@ class SimBoard(HostBoard):
         self._lib.sim_show(self._sim, largest_v, scene.quiet_frames, scene.frames, scene.rate_hz)
 
     def _put(self, frame: int) -> None:
-        """The frames around number ``frame`` of all, as far as they are known; where touches move,
-        that one with its rows as they will be when this scan comes to them; where fingers press,
-        that one as they and the scene's touches are in the middle of the scan."""
+        """Give the board the known frames around number ``frame``. If touches move, only that frame
+        is given, with each row as it will be when the scan measures it. If fingers press, it is the
+        frame with fingers and scene as they are in the middle of the scan."""
         scene = self.frames.scene
         if self._shown:
             pressed = self._rows.pressed(frame, self._shown)
@@ -152,7 +152,7 @@ class SimTransport(Transport):
         self.board.fingers = tuple(TrueTouch(x, y, finger_mm, contrast) for x, y in on)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Close it; there is nothing to release."""
 
 
 def check_prebuilt_fits(scene: Scene) -> None:

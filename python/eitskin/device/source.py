@@ -1,5 +1,6 @@
-"""Frames of another instrument: what a source is, and the transport that feeds its frames to the
-board's own application, so that tare, stream, record and all else work as with a board.
+"""Frames of another instrument: the interface of a source, and the transport that feeds its frames
+to the board's own application, so that tare, stream, record and all other commands work as with a
+board.
 
 A source of your own is a class with ``read``; the entry point group ``eitskin.sources`` gives it a
 scheme (docs/guide/your-board.md).
@@ -265,7 +266,8 @@ class SourceTransport(Transport):
             self._board_s = now
 
     def _passed_us(self, frame: GivenFrame, now: float) -> int:
-        """From the frame before, by the instrument's clock where it has one, else by ours."""
+        """Return the time since the frame before, by the instrument's clock if it has one, else by
+        the host's."""
         last, self._last_time_s = self._last_time_s, frame.time_s
         if frame.time_s is not None and last is not None and 0 < frame.time_s - last < MAX_GAP_S:
             return round(1e6 * (frame.time_s - last))
@@ -324,8 +326,8 @@ def source_schemes() -> tuple[str, ...]:
 
 
 def open_source(url: str, *, model: bytes | None = None) -> Transport:
-    """The source behind ``url`` of a scheme that a package brings: what it names is called with
-    what follows the colon, and gives a ``Source`` or a transport.
+    """Open the source behind ``url``, whose scheme another package defines: its entry point is
+    called with the text after the colon, and returns a ``Source`` or a transport.
 
     Raises:
         UsageError: it cannot be loaded, fails, or gives something else.

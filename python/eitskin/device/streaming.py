@@ -81,7 +81,7 @@ class _Progress:
 
     @property
     def rest(self) -> int:
-        """Frames that are still to come, 0 where there is no limit."""
+        """The number of frames that are still to come; 0: there is no limit."""
         return max(self.wanted - max(self._came.values(), default=0), 1) if self.wanted else 0
 
 
@@ -198,7 +198,7 @@ class BoardPackets:
         self._start()
 
     def _is_over(self) -> bool:
-        """Nothing came for a while: ask the board whether it has sent everything."""
+        """After a while without packets: ask the board whether it has sent everything."""
         device, progress = self._device, self._progress
         before = device.board
         now = device.info()

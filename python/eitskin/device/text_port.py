@@ -67,7 +67,7 @@ class SerialLines(LinePort):
 
 
 class FileLines(LinePort):
-    """A file: its lines come as fast as they are asked for."""
+    """A file: its lines come as fast as they are read."""
 
     waits, keeps = False, True
 

@@ -186,8 +186,9 @@ class TextSource(Source):
                 raise UsageError(f"{self._where}: {error}") from None
 
     def _decided(self, rows: list[Row]) -> list[Row]:
-        """Decide how long a line is if the layout does not say: as long as two lines that came, so
-        that a first line that was cut is skipped. Return the rows so far, once that is known."""
+        """Decide the length of a line if the layout does not state it: the length that two lines
+        have, so that a first line that was cut is skipped. Return the rows so far, once the length
+        is known."""
         self._undecided += rows
         lengths = Counter(
             len(row.cells) for row in self._undecided[self._header :] if has_number(row)

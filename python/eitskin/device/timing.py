@@ -57,8 +57,8 @@ def check_name(name: str, where: str) -> str:
 
 
 def split_timing(url: str) -> tuple[str, Timing]:
-    """A device's URL without what follows '?', and what that asks for. URLs of other schemes than
-    sim, emu and file stay as they are, but for a name."""
+    """Return a device's URL without its query, and the settings of the query. In URLs of other
+    schemes than sim, emu and file only a name is taken out."""
     url = split_name(url)[0]
     scheme, _, _ = url.partition(":")
     bare, mark, query = url.rpartition("?")

@@ -1,5 +1,5 @@
-"""How bytes reach a board and come back: what every kind of device gives, and what it declares
-that it can do. Nobody asks a transport for more than stands here."""
+"""The way of bytes to a board and back: the interface of every kind of device, and the abilities
+that it declares. No caller uses more of a transport than this."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -134,9 +134,9 @@ class Transport(ABC):
         return False
 
     def begin_scene(self) -> int | None:
-        """Begin what is to be touched: until then a simulated skin is untouched. Returns the
-        board's clock at the scene's time 0, in us; None: it is when the next scan begins, or the
-        skin is real."""
+        """Begin the touches of the scene: until then a simulated skin is untouched. Returns the
+        board's clock at the scene's time 0, in us. None: that time is when the next scan begins, or
+        the skin is real."""
         return None
 
     def press(self, places_mm: Sequence[tuple[float, float]]) -> None:

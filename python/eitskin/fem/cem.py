@@ -34,8 +34,8 @@ except ModuleNotFoundError as error:
 
 @dataclass
 class Counters:
-    """The work of a forward model so far: sparsity patterns made, factorisations, and right-hand
-    sides solved."""
+    """The work of a forward model so far: the numbers of sparsity patterns, factorisations and
+    solved right-hand sides."""
 
     patterns: int = 0
     factorisations: int = 0

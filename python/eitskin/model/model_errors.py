@@ -51,8 +51,7 @@ class TarePlaces:
 
 @dataclass(frozen=True, eq=False)
 class RowErrors:
-    """What the joint fit of touches, which works on the k folded rows, knows of skins that differ
-    from the model.
+    """The model errors on the k folded rows, for the joint fit of touches.
 
     ``vectors`` e (n, k) give the errors' second moment sum e e', relative to |d|^2, in skins whose
     y = log(v0 / v_ref) has the rms ``distance``. ``seen`` (q, k) and ``moves`` (2, 2, t, q) are as

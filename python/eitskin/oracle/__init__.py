@@ -1,4 +1,4 @@
-"""The oracle: what a reconstruction is by definition, in dense float64 numpy.
+"""The oracle: a reconstruction by its definition, in dense float64 numpy.
 
 The C core is compared with it. It is written from the formulas of docs/reference and of
 docs/design/oracle.md, not from the C code: without caches, without limits of work, without updates

@@ -1,5 +1,5 @@
-"""Touches as discs: what they answer, what they do to each other, what a fit of them costs, and
-the best fit from several starts. docs/design/oracle.md, "Touches", has the formulas."""
+"""Touches as discs: their answers, their interaction, the cost of a fit, and the best fit from
+several starts. docs/design/oracle.md, "Touches", has the formulas."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -38,8 +38,8 @@ class Disc:
 
 
 def cover(grid: Grid, x_mm: float, y_mm: float, radius_mm: float) -> FloatArray:
-    """How much of each pixel (n,) the disc covers: 1/2 + (radius - distance) / pixel, within 0 and
-    1."""
+    """Return the fraction of each pixel (n,) that the disc covers: 1/2 + (radius - distance) /
+    pixel, limited to 0 to 1."""
     distance = np.linalg.norm(grid.centres_mm() - (x_mm, y_mm), axis=1)
     return np.asarray(np.clip(0.5 + (radius_mm - distance) / grid.pixel_mm, 0.0, 1.0))
 
@@ -96,12 +96,13 @@ class DiscFit:
         return np.asarray(self.per_change @ covers) * disc.change
 
     def residual(self, discs: Sequence[Disc]) -> FloatArray:
-        """y less what the discs add to it (r,)."""
+        """Return y minus the answers of the discs (r,)."""
         return self.y - sum((self.answer(disc) for disc in discs), np.zeros(len(self.y)))
 
     def prior(self, disc: Disc, answer: FloatArray) -> float:
-        """The root of the cost of its radius: how far it is from the one that its strength
-        suggests, in deviations, weighed by its own energy, or by noise where that is more."""
+        """Return the root of the cost of a disc's radius: its distance in deviations from the
+        radius that its strength suggests, weighted by the disc's energy, or by that of noise if it
+        is greater."""
         o = self.options
         expected = o.touch_seed_radius_mm
         if o.touch_change_s_per_m > 0:
@@ -118,7 +119,7 @@ class DiscFit:
         return np.append(answer, -self.prior(disc, answer))
 
     def cost(self, discs: Sequence[Disc]) -> float:
-        """|y - what the discs add|^2 and the costs of their radii."""
+        """Return |y - answers of the discs|^2 plus the costs of their radii."""
         parts = np.array([self.parts(disc) for disc in discs]).reshape(-1, len(self.y) + 1)
         left, priors = self.y - parts[:, :-1].sum(axis=0), parts[:, -1]
         return float(left @ left + priors @ priors)
@@ -226,9 +227,9 @@ class DiscFit:
         ]
 
     def fitted(self, starts: Sequence[Disc]) -> list[Disc]:
-        """The best fit from ``starts``, with a disc more where what is left asks for one, and
-        without those that the others can do without: each lowers the cost by
-        ``touch_min_fraction`` of |y|^2, the others fitted again without it."""
+        """Return the best fit from ``starts``. A disc is added if the residual requires one, and
+        discs that are not needed are removed: without each remaining disc, the cost of the others,
+        fitted again, is higher by at least ``touch_min_fraction`` of |y|^2."""
         discs, whole = self.best(starts), float(self.y @ self.y)
         least = self.options.touch_min_fraction * whole + MORE_THAN_NOISE * self.noise
         while 0 < len(discs) < self.options.max_touches:

@@ -74,8 +74,8 @@ class Explained:
 
 
 class OracleEngine:
-    """One model's frames to images and touches, by definition. Slow. Its methods hold ``lock``, as
-    those of the C core's engine."""
+    """Turns one model's frames into images and touches, by definition. It is slow. Its methods hold
+    ``lock``, like those of the C core's engine."""
 
     def __init__(self, model: Model) -> None:
         self.lock = threading.RLock()
@@ -352,8 +352,8 @@ class OracleEngine:
         return model.fields is not None and model.data_kind == "difference" and wanted
 
     def _discs(self, seen: Explained, image: FloatArray) -> tuple[DiscFit, list[Disc]]:
-        """Discs from the peaks of ``image`` (n,), fitted to the data less what they do to each
-        other, and those data."""
+        """Return discs from the peaks of ``image`` (n,), fitted to the data without their
+        interaction, and these data."""
         fit = self.disc_fit(seen)
         starts = self.starts(fit, image)
         if self.options.touch_sweeps == 0:

@@ -87,8 +87,9 @@ def electrodes(
 def _open(
     model: Model, table: IntArray, judged: BoolArray, alive: BoolArray, silent: BoolArray
 ) -> tuple[tuple[int, ...], int]:
-    """Open electrodes, and of how many there are enough rows to tell: none of its rows is alive, or
-    all that it drives with several partners are silent."""
+    """Return the open electrodes, and the number of electrodes with enough rows for a decision. An
+    electrode is open if none of its rows is alive, or if all rows that it drives with several
+    partners are silent."""
     opened, told = [], 0
     for e in range(model.protocol.n_electrodes):
         uses, drives = (table == e).any(axis=1) & judged, (table[:, :2] == e).any(axis=1) & judged

@@ -82,8 +82,9 @@ class Lasso:
         gap: float = 0.0,
         every: int = 1,
     ) -> tuple[FloatArray, int]:
-        """x (n,) after so many iterations of FISTA with steps of 1 / lipschitz, and their number;
-        fewer where the duality gap, looked at every so many iterations, is at most ``gap`` > 0.
+        """Return x (n,) after the given number of iterations of FISTA with steps of 1 / lipschitz,
+        and their number. With ``gap`` > 0 there are fewer if the duality gap, which is checked at
+        intervals, is at most ``gap``.
 
         Beck and Teboulle, SIAM J. Imaging Sci. 2 (2009) 183, doi 10.1137/080716542.
         """

@@ -1,4 +1,4 @@
-"""Places of touches, corrected by what the reference says of misplaced electrodes:
+"""Correct the places of touches for misplaced electrodes, which the reference shows:
 docs/reference/eitm-format.md, "MOVE" and "ROWE"."""
 
 import numpy as np

@@ -119,9 +119,10 @@ def changed_rows(
 def without_outliers(
     model: Model, frames: FloatArray, masked: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Untouched ``frames`` (k, m) with readings replaced that the others contradict, and which
-    (k, m): of the first two frames the one that the third contradicts too, by the other; of later
-    ones by the mean so far."""
+    """Return the untouched ``frames`` (k, m) with outliers replaced, and which readings were
+    replaced (k, m). If the first two frames disagree in a reading, the one that the third frame
+    contradicts gets the other's value; in later frames an outlier gets the value of the mean so
+    far."""
     done, left, used = frames.copy(), np.zeros(frames.shape, dtype=bool), ~masked
     differ = {
         (new, old): odd_folds(model, frames[new], frames[old], used)

@@ -14,8 +14,8 @@ from eitskin.model.model import Model
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """|M d - S x|^2 is what the solver minimises: ``data`` M (r, k), zero columns for folds that
-    are not in use, and ``seen`` S (r, n).
+    """The solver minimises |M d - S x|^2. ``data`` is M (r, k), with zero columns for folds that
+    are not in use, and ``seen`` is S (r, n).
 
     ``regularisation`` mu; ``noise_ratio``: how much more white noise on the folds raises max(S'y)
     than with the stored model and all rows. ``ignored`` (r, any number): columns are directions in
@@ -114,8 +114,9 @@ def _of_teaching(model: Model, known: BoolArray) -> Whitening:
 
 
 def project_out(directions: FloatArray, least: float) -> tuple[FloatArray, int]:
-    """Q (r, r), which takes out the span of the columns of ``directions`` (r, any), and its
-    dimension; not those of whose square others have all but the fraction ``least``."""
+    """Return Q (r, r), which projects out the span of the columns of ``directions`` (r, any), and
+    the dimension of that span. A column counts as dependent if at most the fraction ``least`` of
+    its square is outside the span of the others."""
     basis = np.zeros((len(directions), 0))
     for one in directions.T:
         left = one - basis @ (basis.T @ one)

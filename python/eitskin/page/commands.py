@@ -124,7 +124,7 @@ class PageCommands:
         return session.ask(action)
 
     def recording(self) -> Path:
-        """The recording that is shown, or the last one that was made here."""
+        """Return the recording that is shown, or the last one that was made here."""
         session = self._reader.session or self._reader.last
         shown = session is not None and session.replays
         path = Path(session.name) if session is not None and shown else self._recorded
@@ -164,7 +164,7 @@ class PageCommands:
         return self._each(whole, action)
 
     def mode(self, kinds: list[str]) -> Future[str]:
-        """Choose what is streamed."""
+        """Choose the kinds of packets that are streamed."""
         if not kinds or not set(kinds) <= set(KINDS):
             raise UsageError(f"mode: choose from {', '.join(KINDS)}")
         mode = Stream(0)
@@ -283,7 +283,7 @@ class PageCommands:
         self._reader.report("notice", {"kind": "session", "text": str(error), "time_s": None})
 
     def _end_recording(self, session: Session) -> str:
-        """End the recording, if there is one, and say what was recorded."""
+        """End the recording, if there is one, and report what was recorded."""
         recorder, session.recorder = session.recorder, None
         if recorder is None:
             return ""

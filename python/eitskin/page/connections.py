@@ -1,5 +1,5 @@
-"""Connections to the page's server that cannot hold it up: each has a limited time to say what it
-wants, there are only so many, and one whose answers are not read is cut."""
+"""Connections to the page's server, which cannot block it: each has a limited time for its request,
+their number is limited, and a connection whose answers are not read is closed."""
 
 import asyncio
 from typing import Any

@@ -41,7 +41,7 @@ HEAD = struct.Struct("<4sIII")
 
 
 def text_of(kind: str, /, **facts: Any) -> str:
-    """A message that is no frame."""
+    """Return the text of a message that is not a frame."""
     return json.dumps({"type": kind} | facts, separators=(",", ":"), allow_nan=False)
 
 

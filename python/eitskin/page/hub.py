@@ -1,5 +1,6 @@
-"""The pages that are open. A frame goes to each page that has drawn what it got; what a page cannot
-take is dropped and counted, and nobody waits for it. Of each skin the newest frame waits."""
+"""The open pages. A frame is sent to each page that has drawn its last one. Frames that a page
+cannot take are dropped and counted; other pages do not wait for it. The newest frame of each skin
+waits."""
 
 import asyncio
 import time
@@ -25,7 +26,7 @@ class Outgoing:
 
 
 class PageClient:
-    """One page: what waits for it, and what it has not drawn yet."""
+    """One page: the messages that wait for it, and the frames that it has not drawn yet."""
 
     def __init__(self) -> None:
         self.may_command = self.presses = False
@@ -43,7 +44,7 @@ class PageClient:
         self._changed = asyncio.Event()
 
     def offer(self, frame: Outgoing) -> None:
-        """The newest frame of a skin; one that was not sent yet is dropped for it."""
+        """Offer the newest frame of a skin; it replaces one that was not sent yet."""
         self.dropped += frame.source in self._frames
         self._frames[frame.source] = frame
         self._sources.add(frame.source)

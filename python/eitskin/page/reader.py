@@ -83,7 +83,7 @@ class SessionReader:
             self._thread.join(SINKS_S)
 
     def again(self, time_s: float = 0.0) -> None:
-        """Open the device again, where a session is over; a recording goes on at ``time_s``."""
+        """Open the device again after the end of a session; a recording continues at ``time_s``."""
         self._begin_s = time_s
         self._again.set()
 

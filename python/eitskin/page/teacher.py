@@ -35,7 +35,7 @@ class Teacher:
         self._lock = threading.Lock()
 
     def begin(self, session: Session) -> None:
-        """Set the scan of a session that has not started, and go on where the file ends."""
+        """Set the scan of a session that has not started, and continue where the file ends."""
         board = session.device.board
         session.settings = replace(session.settings, scan=scan_of_presses(board, session.replays))
         protocol = scanned_protocol(board, session.known, session.name)
@@ -66,7 +66,8 @@ class Teacher:
         self.on_event(self.facts())
 
     def facts(self) -> dict[str, Any]:
-        """For pages: what to do now, where, and what is done."""
+        """Return the facts for pages: the present step, its place, and the presses that are
+        done."""
         guide, file = self._guide, self._file
         return {
             "step": "rest" if guide is None else guide.step.name.lower(),
@@ -93,7 +94,8 @@ class Teacher:
         return event.text
 
     def fit(self) -> tuple[bytes, str]:
-        """The taught model's bytes, also in a file beside the presses, and how good it is."""
+        """Return the taught model's bytes, which are also written to a file beside the presses, and
+        a report of its quality."""
         presses = None if self._file is None else self._file.presses
         if presses is None:
             raise UsageError("teach: no press is there yet")

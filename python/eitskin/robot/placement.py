@@ -56,15 +56,16 @@ class PlacedTouch:
 @dataclass(frozen=True, eq=False)
 class Placement:
     """The place of a skin in the frame of ``link``. ``pose`` is that of its drawing, with z out of
-    the skin; of a ``surface`` it is that of its mesh."""
+    the skin; for a ``surface`` it is the pose of its mesh."""
 
     link: str
     pose: Pose = IDENTITY
     surface: SurfaceMap | None = None
 
     def place(self, touch: LocatedTouch) -> PlacedTouch:
-        """``touch`` in the link's frame. On a surface, the covariance includes what is not known of
-        the touch's radius (``SurfaceMap.touch``); touches after a drive have none."""
+        """Return ``touch`` in the link's frame. On a surface, the covariance includes the
+        uncertainty of the touch's radius (``SurfaceMap.touch``); touches after a drive have
+        none."""
         if self.surface is not None and isinstance(touch, Touch):
             there = self.surface.touch(touch)
             point_m, tangents, normal = there.point_m, there.tangents, there.normal

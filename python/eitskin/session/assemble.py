@@ -49,7 +49,7 @@ class Assembler:
         return done
 
     def rest(self) -> list[Message]:
-        """The frame of which not all kinds came, at the end of a stream."""
+        """Return an incomplete frame at the end of a stream."""
         parts, self._parts, self._number = self._parts, {}, None
         return [_frame(self._clock, parts)] if parts else []
 
@@ -70,14 +70,14 @@ def read_frames(
 
 
 class Clock:
-    """The board's clock, which wraps after 71 minutes, as one that does not."""
+    """Makes a clock that does not wrap of the board's, which wraps after 71 minutes."""
 
     def __init__(self) -> None:
         self._last: int | None = None
         self._elapsed_us = 0
 
     def elapsed_us(self, board_us: int) -> int:
-        """Since the first time that was given; a restarted board goes on from where it was."""
+        """Return the time since the first one; after a restart of the board it continues."""
         if self._last is not None:
             step = (board_us - self._last) % WRAP_US
             if step > WRAP_US - LATE_US:  # a frame comes after drives of the next one

@@ -91,7 +91,8 @@ class DriveReport:
 
     @property
     def touches(self) -> tuple[DriveTouch, ...]:
-        """In the order in which they came: mm, mm/s; their ids are those of frames."""
+        """The touches in the order in which they landed, in mm and mm/s; their ids are those of
+        frames."""
         return self.packet.touches
 
     @cached_property
@@ -188,7 +189,7 @@ class Frame:
 
     @property
     def diagnostics(self) -> tuple[str, ...]:
-        """Names of what was found wrong with the frame."""
+        """Names of the frame's diagnostics."""
         return () if self.info is None else names(self.info.diagnostics)
 
     @property
@@ -214,7 +215,7 @@ class Frame:
 
     @property
     def image_is(self) -> str | None:
-        """Return "touches" or "solver", of which ``image`` is made; None without an image."""
+        """Return "touches" or "solver": the source of ``image``; None without an image."""
         if self.touch_image is not None:
             return "touches"
         return None if self.solver_image is None else "solver"
@@ -231,8 +232,8 @@ class Frame:
 
     @cached_property
     def places_mm(self) -> FloatArray | None:
-        """Centroids (k, 2) of what stands out of the solver's image, strongest first
-        (``image_touches``, at the model's threshold for touches); None as ``peak``, or where scipy
+        """Centroids (k, 2) of the parts that stand out in the solver's image, strongest first
+        (``image_touches``, at the model's threshold for touches); None as for ``peak``, or if scipy
         is not installed."""
         if self.peak is None or self.known is None:
             return None

@@ -1,5 +1,5 @@
-"""A stream's gestures: the board's own where it sends them, else what its touches give here, by the
-same C code; named zones always here."""
+"""A stream's gestures: the board's own if it sends them, else those that the same C code finds here
+in its touches. Named zones are always examined here."""
 
 from collections.abc import Sequence
 

@@ -1,5 +1,5 @@
-"""Who looks at a session from outside, such as the truth of a simulated scene
-(``eitskin.scoring.observer``). A session knows nothing of scenes or scores."""
+"""Observers look at a session from outside, such as the truth of a simulated scene
+(``eitskin.scoring.observer``). A session itself does not use scenes or scores."""
 
 from typing import Any, Protocol
 
@@ -7,7 +7,7 @@ from eitskin.session.frame import Frame
 
 
 class Observer(Protocol):
-    """Adds to frames what it knows of them, and says when there is nothing more to see."""
+    """Adds its knowledge to frames, and reports when there is nothing more to see."""
 
     def began(self, board_us: int) -> None:
         """The scene has begun: the board's clock at its time 0. Not called where nobody knows: then
@@ -20,7 +20,7 @@ class Observer(Protocol):
         """Whether there is nothing more to see in a frame whose scan began then."""
 
     def see(self, frame: Frame) -> Frame:
-        """``frame`` with what is known of it."""
+        """Return ``frame`` with the observer's knowledge about it."""
 
     def facts(self) -> dict[str, Any] | None:
         """Return the summary for JSON; None if nothing was seen."""

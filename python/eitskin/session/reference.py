@@ -14,8 +14,8 @@ MAX_FRAMES = 1024  # of one tare
 
 class ReferenceMean:
     """Taps ``link``: ``mean_v`` (m,) is known once a frame follows the untouched ones; rows that
-    could not be measured are 0 V. None where no untouched frames were seen. ``before`` is that of
-    the device before it was opened again."""
+    could not be measured are 0 V. It is None if no untouched frames were seen. ``before`` is the
+    reference of the device before it was opened again."""
 
     def __init__(self, link: Link, before: "ReferenceMean | None" = None) -> None:
         self.mean_v: FloatArray | None = None if before is None else before.mean_v

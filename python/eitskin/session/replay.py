@@ -23,7 +23,7 @@ class Replay:
         """The time of the last frame that was shown."""
 
     def take(self, message: Message) -> Message | None:
-        """``message`` as it is shown; None where it is not."""
+        """Return ``message`` as it is shown; None if it is not shown."""
         if isinstance(message, DriveReport):
             return replace(message, time_us=self._shown_us(message.time_us))
         if not isinstance(message, Frame):

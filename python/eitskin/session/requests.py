@@ -13,8 +13,8 @@ T = TypeVar("T")
 
 
 class Requests:
-    """Actions that wait for the board, in the order in which they were asked for. Every one gets an
-    answer: what it returns or raises; where it cannot be carried out any more, or not now, a
+    """Actions that wait for the board, in the order of the requests. Each gets an answer: its
+    result, the exception that it raises, or, if it cannot be carried out now or any more, a
     DeviceError that says why."""
 
     def __init__(self) -> None:

@@ -60,7 +60,7 @@ class Lane:
         return message
 
     def wake(self) -> None:
-        """Let the thread look again whether to go on, with the queue's lock held."""
+        """Make the thread check again whether to continue; the queue's lock must be held."""
         self._taken.notify()
 
 
@@ -143,7 +143,7 @@ class RobotQueue:
         return None
 
     def _first(self) -> int | None:
-        """The lane whose message is next; None while one that is timed has none."""
+        """Return the lane whose message is next; None while a lane with times has no message."""
         best, first, complete = None, (0, 0), True
         for number, lane in enumerate(self.lanes):
             if len(lane):

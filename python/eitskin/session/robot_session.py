@@ -68,8 +68,8 @@ class RobotSummary:
 class RobotSession:
     """All skins of ``robot``, set up and streaming, used as a ``Session``: ``with`` opens every
     board, and one that cannot be opened is an error; ``start`` sets them up side by side;
-    ``messages`` gives what comes from all of them. A board that is lost later is opened again and
-    again while the others go on.
+    ``messages`` yields the messages of all of them. A board that is lost later is opened again
+    repeatedly while the others continue.
 
     Simulated and recorded skins have one clock, and come in its order, at ``speed``. Arguments and
     ``stop``, ``tare`` and ``close`` are as of ``Session``.
@@ -170,7 +170,8 @@ class RobotSession:
 
     @property
     def patient(self) -> bool:
-        """No clock is kept: whoever takes its messages may take as long as they like."""
+        """Return whether no clock is kept, so that the consumer of its messages may take any
+        time."""
         return self.timed and not self.pacer.speed
 
     @property
@@ -178,7 +179,7 @@ class RobotSession:
         return RobotSummary({one.skin.name: one.summary for one in self._skins})
 
     def facts(self) -> dict[str, Any]:
-        """The summary as it is now, for JSON; ``skins`` has that of each."""
+        """Return the present summary, for JSON; ``skins`` has the summary of each skin."""
         skins = {
             name: summary.as_dict() | {"truth": self.parts[name].facts()["truth"]}
             for name, summary in self.summary.skins.items()
@@ -298,7 +299,7 @@ class RobotSession:
 
 
 def all_of(answers: dict[str, "Future[Any]"]) -> "Future[Any]":
-    """The first skin's answer once those of all skins are there, or the first error, with the
+    """Return the first skin's answer once all skins have answered, or the first error, with the
     skin's name. It cannot be cancelled."""
     answer: Future[Any] = Future()
     answer.set_running_or_notify_cancel()

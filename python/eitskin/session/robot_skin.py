@@ -23,17 +23,17 @@ MAX_DRIFT = 100e-6  # by which two quartzes differ
 
 
 class HostClock:
-    """A board's times by the clock of the host. A message cannot come before it was made: the
-    smallest delay so far is taken for none, and rises by ``MAX_DRIFT``, so that it follows a board
-    whose clock is slow."""
+    """Converts a board's times to the clock of the host. A message cannot come before it was made:
+    the smallest delay so far counts as zero. It rises by ``MAX_DRIFT``, so that it follows a board
+    with a slow clock."""
 
     def __init__(self) -> None:
         self._offset_us: float | None = None
         self._last_us = 0.0
 
     def offset_us(self, made_us: int, arrived_us: float) -> float:
-        """How much is to be added to the board's times, by a message that was complete at
-        ``made_us`` of its clock and came at ``arrived_us`` of the host's."""
+        """Return the number to add to the board's times, by a message that was complete at
+        ``made_us`` on its clock and arrived at ``arrived_us`` on the host's."""
         now = arrived_us - made_us
         if self._offset_us is None:
             self._offset_us = now
@@ -44,8 +44,8 @@ class HostClock:
 
 class RobotSkinSession:
     """A skin of a robot: its session, and the thread that puts its messages into lane ``number`` of
-    ``queue``. ``opened`` makes its session from its own settings, which ``settings`` are but for
-    what the skin alone has.
+    ``queue``. ``opened`` makes its session from its settings, which are ``settings`` plus those of
+    this skin alone.
 
     Attributes:
         session: the one under way; another one after its board was lost.
@@ -228,5 +228,5 @@ class RobotSkinSession:
 
 
 def named(name: str, error: BaseException) -> BaseException:
-    """``error`` with the skin's name, if it is one that a user can cause."""
+    """Return ``error`` with the skin's name, if it is one that a user can cause."""
     return type(error)(f"skin {name!r}: {error}") if isinstance(error, EitskinError) else error

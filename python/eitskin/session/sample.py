@@ -1,4 +1,4 @@
-"""A bounded memory of many numbers: quantiles of a stream that may go on for ever."""
+"""A bounded memory of many numbers, for quantiles of a stream without an end."""
 
 import random
 from array import array
@@ -27,5 +27,5 @@ class Sample:
             self.values[place] = value
 
     def quantile(self, fraction: float) -> float:
-        """As numpy's; NaN where nothing was added."""
+        """As numpy's; NaN if nothing was added."""
         return float(np.quantile(self.values, fraction)) if self.values else float("nan")

@@ -206,7 +206,7 @@ class Session:
 
     @property
     def patient(self) -> bool:
-        """No clock is kept: whoever takes its frames may take as long as they like."""
+        """Return whether no clock is kept, so that the consumer of its frames may take any time."""
         return self.timed and not self.pacer.speed
 
     def start(self) -> None:
@@ -278,8 +278,8 @@ class Session:
         self.solver = set_up(self.device, ScanSettings(), self.settings.solver, known)
 
     def apply(self, settings: SessionSettings) -> None:
-        """Set scan and solver as ``settings`` name them, from now on; they stay what they were
-        where that cannot be."""
+        """Set scan and solver from now on as ``settings`` name them. If that is not possible, they
+        do not change."""
         before, self.settings = self.settings, settings
         try:
             scan, solver = self.scan_and_solver()
@@ -291,9 +291,9 @@ class Session:
     # ---- what comes ----
 
     def messages(self) -> Generator[Message, None, None]:
-        """Frames, reports after drives where the settings ask for them, and notices of what is new,
-        until the scene, the recording or the number of frames is over. This is the one loop that
-        every message passes; ``summary`` counts them."""
+        """Yield frames, reports after drives if the settings ask for them, and notices of news,
+        until the end of the scene, of the recording, or of the number of frames. Every message
+        passes this loop; ``summary`` counts them."""
         advice = "Session.stop() ends it from any thread"
         return OneThreadAtATime(self._guarded(), "the session's messages", advice)
 
@@ -444,25 +444,25 @@ class Session:
         yield frame if self.observer is None else self.observer.see(frame)
 
     def _over(self, frame: Frame) -> bool:
-        """Nothing more is to be seen, such as after the end of a scene whose last frame an emulated
-        board holds for ever."""
+        """Return whether there is nothing more to see, as after the end of a scene, whose last
+        frame an emulated board shows for ever."""
         if self.settings.frames or self.observer is None:
             return False
         return self.observer.over(frame.board_us)
 
     def facts(self) -> dict[str, Any]:
-        """The summary as it is now, for JSON."""
+        """Return the present summary, for JSON."""
         truth = None if self.observer is None else self.observer.facts()
         return self.summary.as_dict() | {"truth": truth}
 
     def finish(self) -> Summary:
-        """The summary, with what the link and the board counted; a board that did not answer when
-        it was stopped is not asked."""
+        """Return the summary with the counters of the link and of the board. A board that did not
+        answer when it was stopped is not asked for them."""
         self.summary.finish(self.device, self._answers_s)
         return self.summary
 
     def count_links(self) -> None:
-        """Put what the link counted into the summary, without asking the board."""
+        """Put the link's counters into the summary, without asking the board."""
         self.summary.link = self.device.counters.as_dict()
 
     # ---- steps ----
@@ -475,7 +475,8 @@ class Session:
         return device
 
     def _find(self) -> None:
-        """Decide what the settings leave open: the model, what is streamed, who observes."""
+        """Decide what the settings leave open: the model, the kinds of packets, and the
+        observer."""
         how, board = self.settings, self.device.board
         if how.mode is None:
             how = replace(how, mode=ALL_KINDS if self.timed else Stream.IMAGE | Stream.TOUCHES)

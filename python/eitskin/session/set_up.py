@@ -20,9 +20,8 @@ UNTOUCHED_S = 20.0  # that a tare waits for fingers to lift
 def set_up(
     device: Device, scan: ScanSettings, solver: SolverSettings, known: KnownModel | None
 ) -> Options | None:
-    """Set scan and solver; returns the solver's options as they now are, None where the model is
-    not known here and nothing of the solver was asked for: then they stay what they are, whatever
-    that is.
+    """Set scan and solver. Returns the solver's present options, or None if the model is not known
+    here and no option of the solver was requested: then the options do not change.
 
     Raises:
         UsageError: a number is out of its range.
@@ -66,7 +65,7 @@ def wait_untouched(
 def take_reference(
     device: Device, frames: int, *, streamed: bool = False, anyway: bool = False
 ) -> None:
-    """Tare; where ``streamed``, the untouched frames are sent as raw frames too, for recordings.
+    """Tare. With ``streamed`` the untouched frames are also sent as raw frames, for recordings.
     ``anyway`` and errors are those of ``Device.tare``."""
     if not streamed:
         device.tare(frames, anyway=anyway)
@@ -88,9 +87,9 @@ def take_reference(
 
 
 def begin_scene(device: Device) -> tuple[int | None, list[Fault | LinkEvent]]:
-    """Let what is to be touched begin, on a simulated board. Where the scene begins within a scan,
-    that scan, which still shows the untouched skin, is waited for. Returns the board's clock at the
-    scene's time 0 (None: it is when the next scan begins), and what was reported meanwhile.
+    """Begin the touches of the scene on a simulated board. If the scene begins within a scan, the
+    end of that scan, which still shows the untouched skin, is waited for. Returns the board's clock
+    at the scene's time 0 (None: it is when the next scan begins), and the notices in the meantime.
     """
     events: list[Fault | LinkEvent] = []
     began_us = device.start_scene()

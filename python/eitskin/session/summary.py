@@ -45,7 +45,7 @@ class Summary:
 
     @property
     def rate_hz(self) -> float | None:
-        """Streamed frames a second of the board's time."""
+        """Streamed frames per second of the board's time."""
         span = self.last_us - self.first_us
         return 1e6 * (self.frames - 1) / span if span > 0 else None
 
@@ -96,8 +96,8 @@ class Summary:
         return lines
 
     def finish(self, device: Device, limit_s: float) -> None:
-        """Add what the link and the board counted; the part of a board that does not answer within
-        ``limit_s`` is left out. With 0 it is not asked."""
+        """Add the counters of the link and of the board. Those of a board that does not answer
+        within ``limit_s`` are left out; with 0 it is not asked."""
         self.link = device.counters.as_dict()
         self.board = None
         if limit_s and not (device.replays or device.link.ended or device.link.away):

@@ -53,7 +53,7 @@ def load_zones(path: str | Path) -> tuple[Zone, ...]:
 
 
 def refuse_off_skin(zones: Sequence[Zone], grid: Grid) -> None:
-    """Refuse a zone of which nothing lies on the skin: no finger could press it."""
+    """Reject a zone that lies outside the skin entirely, because no finger could press it."""
     for area in map(_Area, zones):
         on_skin = grid.locate(area.inner_points()) >= 0
         if not on_skin.any() and not area.contains(grid.centres_mm()).any():

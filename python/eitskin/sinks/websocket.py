@@ -80,7 +80,8 @@ class WebSocketSink:
 
         class Client(ServerConnection):
             def data_received(self, data: bytes) -> None:
-                """Pings are answered at once, so one that only pings and never reads is cut."""
+                """Pings are answered at once, so a client that sends only pings and never reads is
+                disconnected."""
                 if self.transport.get_write_buffer_size() > 2 * FULL_BYTES:
                     self.transport.abort()
                 else:

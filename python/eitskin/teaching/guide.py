@@ -52,8 +52,8 @@ class Step(Enum):
 @dataclass(frozen=True, eq=False)
 class GuideEvent:
     """A change in the guidance after a frame: ``step`` is the step to do now, at place ``number``
-    (from 0), and ``text`` tells it to the person. ``accepted`` and ``rejected`` state the result of
-    a press; ``withdrawn`` states that an accepted press no longer counts."""
+    (from 0), and ``text`` explains it to the person. ``accepted`` and ``rejected`` state the result
+    of a press; ``withdrawn`` states that an accepted press no longer counts."""
 
     step: Step
     number: int

@@ -19,8 +19,9 @@ ENDED = "the disk was full for too long; the file ends there, and can be read"
 
 
 class RecordingFile:
-    """A new file at ``path`` that begins with ``first``; ``overwrite`` replaces a recording that is
-    there, but only once the new one has begun. What is no regular file is written into."""
+    """A new file at ``path`` that begins with ``first``. ``overwrite`` replaces an existing
+    recording, but only after the new one has begun. A path that is not a regular file is written to
+    directly."""
 
     def __init__(self, path: Path, first: bytes, *, overwrite: bool) -> None:
         self._path = path
@@ -91,13 +92,13 @@ class RecordingFile:
         return self._path
 
     def tell_or_zero(self) -> int:
-        """How many bytes are written; 0 where that cannot be asked."""
+        """Return the number of bytes written, or 0 if the file cannot report it."""
         with suppress(OSError):
             return self._file.tell()
         return 0
 
     def sync_now_and_then(self) -> None:
-        """Once a second, begin to bring what was written to the disk; the caller does not wait."""
+        """Once per second, begin to write buffered bytes to the disk; the caller does not wait."""
         if time.monotonic() - self._synced < SYNC_S:
             return
         self._synced = time.monotonic()
@@ -164,7 +165,7 @@ class WaitingFile:
         self._error, self._told = None, False
 
     def tell(self) -> int:
-        """How many bytes were given."""
+        """Return the number of bytes given so far."""
         return self._size
 
     def sync_now_and_then(self) -> None:

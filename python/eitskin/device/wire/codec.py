@@ -1,5 +1,5 @@
-"""The C codec through cffi: packets to bytes and bytes to packets, with every byte that is no
-packet counted."""
+"""The C codec through cffi: packets to bytes and bytes to packets. Bytes that form no packet are
+counted."""
 
 import threading
 import zlib
@@ -81,8 +81,8 @@ class Decoder:
 
     @one_at_a_time
     def link_lost(self) -> None:
-        """The line was cut: what is half received is no error, and any packet may come next; it
-        will count as one gap."""
+        """Call this after the line was cut: a packet that is half received is then no error, and
+        any packet may come next, which counts as one gap."""
         self._begin(self._state.room)
         self._sequence.link_lost()
 

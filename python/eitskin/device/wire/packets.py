@@ -75,13 +75,14 @@ class BoardInfo(InfoPacket):
 
     @property
     def measured_rows(self) -> int:
-        """Measurements in a frame that is no check: all rows, or only one of each reciprocal
-        pair."""
+        """Return the number of measurements in a frame that is not a check: all rows, or one of
+        each reciprocal pair."""
         return self.n_rows if self.check_every == 1 else self.n_folded
 
     @property
     def frame_us(self) -> int:
-        """From one frame to the next, on the board's clock, as far as the settings tell."""
+        """Return the time from one frame to the next on the board's clock, as far as the settings
+        determine it."""
         return max(self.frame_period_us, self.measured_rows * self.slot_us)
 
     @property

@@ -137,8 +137,8 @@ def _check_rest(payload: bytes, head: Payload, size: int, what: str) -> None:
 
 
 def parse_info(payload: bytes) -> BoardInfo:
-    """An INFO, which grows at its end: what an older board does not send is 0, and what a newer one
-    sends beyond the fields known here is passed over."""
+    """Parse an INFO, which may grow at its end: fields that an older board does not send are 0, and
+    unknown fields of a newer board are skipped."""
     if len(payload) >= OLDEST_INFO_BYTES:
         payload = payload.ljust(BoardInfo.LAYOUT.size, b"\0")
     return unpack(BoardInfo, payload, "INFO", more=True)

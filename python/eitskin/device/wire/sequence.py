@@ -68,7 +68,8 @@ class SequenceCheck:
         self._cut = self._next is not None
 
     def admit(self, sequence: int, fingerprint: int, *, restart: bool = False) -> int | None:
-        """How many packets are missing just before this one; None if it is to be refused.
+        """Return the number of packets that are missing just before this one; None if it must be
+        rejected.
 
         ``fingerprint`` tells a packet that came twice from another one with its number;
         ``restart``: an INFO with request 0.

@@ -1,5 +1,5 @@
-"""This host's touches after each drive, from recorded frames: kept in step with a board's, and
-compared with what it sent, bit for bit."""
+"""Compute touches after each drive on this host from recorded frames, in step with a board, and
+compare them with the board's, bit by bit."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ class DrivesTwin:
         self._next = None
 
     def take(self, raw: RawFrame) -> AlignedFrame | None:
-        """The next frame's drives; returns it as it was aligned, None where it was not, or where
+        """Take the next frame's drives. Returns the aligned frame, or None if it was not aligned or
         frames are missing here."""
         reported = self._reported.pop(raw.frame, {})
         if raw.flags & RawFlags.BEGUN:
@@ -95,13 +95,13 @@ class DrivesTwin:
 
 
 def _in_order(fast: FastCore, protocol: Protocol) -> list[int]:
-    """Numbers of drives as they are measured."""
+    """Return the numbers of the drives in the order of measurement."""
     first = {int(rows[0]): number for number, rows in enumerate(fast.rows)}
     return [first[int(row)] for row in protocol.scan_rows if int(row) in first]
 
 
 def _numbers(touches: Sequence[DriveTouch] | Sequence[FastTouch]) -> Numbers:
-    """Each touch's numbers as they are on the wire."""
+    """Return each touch's numbers as they are on the wire."""
     return tuple(
         np.array([touch.id & 0xFFFF, touch.confirmed, touch.x_mm, touch.y_mm, touch.vx_mm_per_s,
                   touch.vy_mm_per_s, touch.strength_s_per_m_mm2, touch.radius_mm,

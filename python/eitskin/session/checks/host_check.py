@@ -1,5 +1,5 @@
-"""Whether a board computes what this host does: its raw frames through the same core, image bits
-and touches compared with what it sent."""
+"""Check that a board computes the same as this host: its raw frames go through the same core, and
+the bits of images and touches are compared with the board's."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, astuple, dataclass, field
@@ -29,7 +29,7 @@ from eitskin.solve.reconstructor import Reconstructor
 
 @dataclass
 class HostCheck:
-    """How many frames were compared and how that ended.
+    """The number of compared frames, and the result of the comparison.
 
     ``same``: every bit of the image, and of the touches but their ids, which count on from whatever
     the board did before, of the events that these touches make, and all that was found in the
@@ -214,8 +214,8 @@ class HostTwin:
         return event_numbers(here).tobytes() == event_numbers(frame.board_events).tobytes()
 
     def _count(self, frame: Frame, same: bool, difference: float, from_before: bool) -> None:
-        """``from_before``: what differs may come from frames before, of which one may be missing
-        here."""
+        """Count a comparison. ``from_before``: a difference may come from earlier frames, because
+        one may be missing here."""
         check = self.check
         if same:
             check.same += 1
@@ -250,8 +250,8 @@ def same_touches(one: tuple[Touch, ...], other: tuple[Touch, ...]) -> bool:
 
 
 def same_diagnostics(info: Info, raw: RawFrame, solved: Solved, options: Options) -> bool:
-    """Whether this host's core found in a frame what the board reports. Rows that the converter
-    saturated are NaN to the core; the quality of the raw frame marks them."""
+    """Return whether this host's core has the same diagnostics of a frame as the board. The core
+    gets saturated rows as NaN; the quality of the raw frame marks them."""
     only_saturated = raw.quality & (Quality.SATURATED | Quality.MASKED) == Quality.SATURATED
     lost = int(np.count_nonzero(only_saturated))
     saturated = options.diagnostics & 1 << DIAGNOSTICS.index("saturated") if lost else 0

@@ -36,7 +36,8 @@ class PacketLog:
         self._device.link.end_tap(self._tap)
 
     def frames(self, what: Stream) -> Iterator[Message]:
-        """The frames so far, faults and gaps between them; ``what`` was streamed."""
+        """Return the frames so far, with the faults and gaps between them; ``what`` are the kinds
+        that were streamed."""
         return assembled(self._contents(), what)
 
     def _contents(self) -> Iterator[_Content | LinkEvent]:
