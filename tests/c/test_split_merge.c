@@ -238,13 +238,13 @@ TEST(moves_are_bounded)
     press(ctx, near, 2);
     for (uint32_t left = 0; left < 2; ++left) {
         eits_fit f = begin(ctx, near, 2);
-        f.moves = EITS_FIT_MOVES - left;
+        f.moves = EITS_MERGE_MOVES - left;
         CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
-        CHECK((f.moves > EITS_FIT_MOVES) == left);
+        CHECK((f.moves > EITS_MERGE_MOVES) == left);
         f = begin(ctx, &one, 1);
-        f.moves = EITS_FIT_MOVES - left;
+        f.moves = EITS_SPLIT_MOVES - left;
         CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), left);
-        CHECK((f.moves > EITS_FIT_MOVES) == left);
+        CHECK((f.moves > EITS_SPLIT_MOVES) == left);
     }
 }
 

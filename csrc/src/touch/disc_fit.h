@@ -104,7 +104,8 @@ void eits_fit_explain(eits_context *ctx, eits_fit *f);
  * other discs are fitted again each time. */
 void eits_fit_prune(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
-/* split_merge.c: neither function tries anything once the fit has made EITS_FIT_MOVES steps */
+/* split_merge.c: no merge is tried once the fit has made EITS_MERGE_MOVES steps, and no split
+ * after EITS_SPLIT_MOVES */
 
 /* Merge overlapping or nearly touching discs if one disc explains as much. Returns 1 if any were
  * merged. */

@@ -142,10 +142,14 @@ def test_a_raw_export_in_another_order_and_polarity(folder, shared_data, capsys)
 
 def test_the_shown_image_of_a_tank_is_better_than_the_solvers(folder, capsys):
     """Nine frames with conducting and resistive objects, some of them wide. The model does not
-    state its errors, so touches may leave more of the data than in simulated scenes."""
+    state its errors, so touches may leave more of the data than in simulated scenes. The MIoU is
+    .858. It was .846, with 16 objects found and 10 false touches, when three objects were shown as
+    eight touches, because discs were no longer merged after 120 steps of the fit."""
     facts = reconstructed(folder, "kit4.npz", capsys, "--sign", "both")
     assert [frame["image_is"] for frame in facts["frames"]] == ["touches"] * 9
     better = [frame["miou_image"] > frame["miou_solver"] for frame in facts["frames"]]
     assert all(better)
-    assert facts["summary"]["miou_image"] >= 0.84
+    assert (facts["summary"]["found"], facts["summary"]["true"]) == (18, 18)
+    assert facts["summary"]["false"] <= 3
+    assert facts["summary"]["miou_image"] >= 0.85
     assert facts["summary"]["miou_image"] >= facts["summary"]["miou_solver"] + 0.15
