@@ -1,5 +1,5 @@
-"""Write what the tables in this folder say to every place that needs it: C headers, Python modules
-and reference pages. From the messages' JSON Schema, write types for TypeScript and C++.
+"""Write the content of the tables in this folder to all places that need it: C headers, Python
+modules and reference pages. From the messages' JSON Schema, write types for TypeScript and C++.
 
 ``python tables/make_tables.py`` writes; with ``--check`` it only names the files that differ, and
 fails if any does. What it writes is committed, so that no build needs this program.

@@ -35,7 +35,7 @@ def types_of(table: Table) -> dict[str, Table]:
 
 
 def enum_of(tables: Tables, name: str) -> Table:
-    """The enum that C calls ``name``, in whichever table it is."""
+    """Return the enum with the C name ``name``, from any table."""
     return next(types_of(table)[name] for table in tables.values() if name in types_of(table))
 
 
@@ -67,5 +67,5 @@ def wrapped(text: str, first: str, others: str) -> list[str]:
 
 
 def origin(name: str) -> str:
-    """What a written file says of itself."""
+    """Return the sentence in a generated file that names its origin."""
     return f"Written by tables/make_tables.py from tables/{name}.toml."

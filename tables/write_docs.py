@@ -10,7 +10,7 @@ MARKED = re.compile(r"(<!-- table (\w+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 
 def pages(tables: Tables) -> Iterator[tuple[str, Lines]]:
-    """Each page that has a mark, with what stands between its marks made again."""
+    """Yield each page with marks, with the text between its marks generated again."""
     known = {name: one for table in tables.values() for name, one in types_of(table).items()}
     for path in sorted((ROOT / "docs" / "reference").glob("*.md")):
         page = path.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The tables as Python modules: options, what the core says of a frame, packets of the link."""
+"""The tables as Python modules: options, diagnostics and info of a frame, packets of the link."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any

@@ -1,2 +1,2 @@
-"""The instrument's hardware: its circuit as code, what is made from it, its simulation by ngspice,
-and the skin's container."""
+"""The instrument's hardware: its circuit as code, the documents made from it, its simulation by
+ngspice, and the skin's container."""

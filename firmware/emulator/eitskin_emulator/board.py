@@ -60,7 +60,7 @@ class EmulatedBoard(BoardParts):
         )
 
     def lose_power(self) -> None:
-        """Power goes and comes back: RAM and what is on the wire are lost, flash is not."""
+        """Switch the power off and on: RAM and the bytes on the wire are lost, flash is not."""
         self.line.clear()
         self.reset("power")
 
@@ -70,7 +70,7 @@ class EmulatedBoard(BoardParts):
         self.cpu.end_slice()
 
     def drop_supply(self, low: bool) -> None:
-        """The supply falls below 2.9 V, not so far that RAM is lost, or is back."""
+        """Let the supply fall below 2.9 V, but not so far that RAM is lost, or bring it back."""
         self.pwr.low = low
         if low and self.pwr.values[0] >> 4 & 1:
             self.exti.supply_fell()
@@ -89,8 +89,8 @@ class EmulatedBoard(BoardParts):
         self.ports["C"].lowered = 1 << SUPPLY_PIN if lost else 0
 
     def halt(self, time_s: float) -> None:
-        """A debugger halts the processor for so long. All else goes on, but for what the program
-        has told DBGMCU to stop."""
+        """Halt the processor as a debugger does, for the given time. Everything else continues,
+        except the peripherals that the program has configured to stop (DBGMCU)."""
         until = self.clock.now + round(time_s * TICKS_PER_S)
         if self.debug.stops_watchdog:
             self.iwdg.hold(until - self.clock.now)
@@ -99,7 +99,8 @@ class EmulatedBoard(BoardParts):
             self.schedule.run_due(self.clock.now)
 
     def send(self, data: bytes) -> None:
-        """The host sends ``data``: at 1 Mbaud from now on, or when what it sent before has left."""
+        """Send ``data`` from the host at 1 Mbaud, from now on or after the bytes that it sent
+        before."""
         self.line.send(data)
 
     def receive(self) -> bytes:

@@ -1,5 +1,5 @@
-"""Peripherals by address. A peripheral whose clock is off reads 0 and ignores writes, as silicon
-does; what is not modelled too, and both are recorded."""
+"""Peripherals by address. A peripheral whose clock is off reads 0 and ignores writes, like the real
+one. So do registers that are not modelled. Both are recorded."""
 
 from typing import Protocol
 

@@ -54,7 +54,7 @@ class BoardClock:
         self._count, self._counted = count, 0
 
     def slice_ends(self, executed: int) -> None:
-        """The slice has executed so many instructions."""
+        """Note that the slice has executed so many instructions."""
         self._base += (executed - self._counted) * self.instruction_ticks
         self._count = None
 

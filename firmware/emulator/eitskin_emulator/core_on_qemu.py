@@ -61,8 +61,8 @@ class EmulatedDrive:
 
 @dataclass(frozen=True)
 class EmulatedScan:
-    """A frame brought to one instant: instructions of that, and of what the solver's touches then
-    confirm; bits of eits_fast_frame; the CRC-32 of its rows."""
+    """An aligned frame: the instructions of the alignment and of the confirmation by the solver's
+    touches, the bits of eits_fast_frame, and the CRC-32 of its rows."""
 
     status: int
     align_instructions: int
@@ -216,8 +216,8 @@ def run_steps(
     portable: bool = False,
     emulator: Sequence[str] = BOARD,
 ) -> EmulatedRun:
-    """The emulated board's results for ``steps``, what it refuses included; a model that is refused
-    must be the last step.
+    """Return the emulated board's results for ``steps``, including rejections; a model that is
+    rejected must be the last step.
 
     ``folder`` is where the program finds its files. ``portable``: plain C instead of the
     processor's own kernels. ``emulator``: the command that runs the program.

@@ -1,5 +1,5 @@
-"""How many instructions a run of Unicorn has executed so far, and where it will stop: asked and set
-from inside a callback.
+"""Read the number of instructions that a run of Unicorn has executed so far, and set where it will
+stop, from inside a callback.
 
 Unicorn's interface gives neither; its engine counts anyway when a run is limited (``count=``). The
 two words are found by watching them count a known program, so that no version's layout is written
@@ -32,7 +32,7 @@ def cortex_m7() -> Any:
 
 
 def address_of(engine: Any) -> int:
-    """Where an engine's state lies."""
+    """Return the address of an engine's state."""
     return int(engine._uch.value)
 
 
@@ -51,14 +51,14 @@ class Counter:
         return int(self._limit.value)
 
     def stop_after(self, instructions: int) -> None:
-        """Let this run stop after so many instructions, at the earliest when the one that calls
-        back has ended."""
+        """Let this run stop after the given number of instructions, but not before the end of the
+        instruction that calls back."""
         self._limit.value = max(min(self._limit.value, instructions), self.begun.value)
 
 
 @lru_cache(maxsize=1)
 def offsets() -> tuple[int, int]:
-    """Where in an engine's state the count and the limit are.
+    """Return the offsets of the count and of the limit in an engine's state.
 
     Raises:
         DeviceError: this build of Unicorn keeps them otherwise.

@@ -1,5 +1,5 @@
-"""The Cortex-M7: Unicorn executes its instructions in slices of a given number; there is no hook an
-instruction.
+"""The Cortex-M7: Unicorn executes its instructions in slices of a given number; there is no hook
+per instruction.
 
 A slice ends early where something must be done outside: WFI, an exception's return, SVC, a fault,
 or a peripheral that brought an event forward. Where slices end does not change what the program
@@ -121,7 +121,7 @@ class Cpu:
 
     @property
     def pc(self) -> int:
-        """Where it goes on."""
+        """The address where execution continues."""
         return self.pc_register.read()[0]
 
     @pc.setter
@@ -129,8 +129,8 @@ class Cpu:
         self.pc_register.write((value | 1,))
 
     def run(self, instructions: int, horizon: int) -> CpuStop:
-        """Execute at most so many instructions, meant to last until ``horizon`` (ticks); tells why
-        it stopped."""
+        """Execute at most the given number of instructions, which should last until ``horizon``
+        (ticks). Returns the reason for the stop."""
         self._told_of, self.horizon = 0, horizon
         self.slices += 1
         stop, begun = CpuStop.COUNT, self.counter.begun

@@ -98,8 +98,8 @@ class Exceptions:
         return stacked
 
     def leave(self) -> bool:
-        """Return by the EXC_RETURN that the program counter holds; False: it or the frame is no
-        good."""
+        """Return from an exception by the EXC_RETURN in the program counter. False: it or the frame
+        is invalid."""
         exc_return = self._cpu.pc | 1
         values = self._frame.read()
         sp, control = values[17], values[18]

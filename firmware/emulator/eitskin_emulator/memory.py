@@ -40,7 +40,8 @@ class Memories:
         self._engine: Any = None
 
     def lose_power(self) -> None:
-        """RAM comes back with what is no good: here a pattern that is no valid anything."""
+        """Fill RAM as after a loss of power: here with a pattern that is not valid data of any
+        kind."""
         self.ram[:] = b"\xa5\x5a\xc3\x3c" * (RAM_BYTES // 4)
         self.itcm[:] = b"\xa5\x5a\xc3\x3c" * (ITCM_BYTES // 4)
 
@@ -73,7 +74,8 @@ class Memories:
         self._map(at, self.flash, at - FLASH, size, UC_PROT_READ | UC_PROT_EXEC)
 
     def find(self, address: int, size: int) -> tuple[mmap.mmap, int] | None:
-        """Which memory holds these bytes, and where in it; None: none does."""
+        """Return the memory that contains these bytes, and their offset in it; None: no memory
+        does."""
         for start, memory, length in (
             (RAM, self.ram, RAM_BYTES),
             (FLASH, self.flash, FLASH_BYTES),
@@ -86,7 +88,7 @@ class Memories:
         return None
 
     def read(self, address: int, size: int) -> bytes | None:
-        """Bytes as DMA sees them; None: there is no memory."""
+        """Return bytes as DMA reads them; None: there is no memory."""
         found = self.find(address, size)
         return None if found is None else found[0][found[1] : found[1] + size]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class Record:
-    """Counts since power came; keys say in words what was counted.
+    """Counts since power-up; the keys describe in words what was counted.
 
     Attributes:
         unmodelled: accesses to addresses and settings that the emulator does not model.

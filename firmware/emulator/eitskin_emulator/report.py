@@ -41,7 +41,8 @@ class BoardReport:
 
     @property
     def clean(self) -> bool:
-        """Nothing was unknown, unclocked, forbidden or wrong; restarts on request are not wrong."""
+        """Return whether no access was unknown, unclocked, forbidden or wrong; requested restarts
+        are not wrong."""
         return not (
             self.violations
             or self.unknown_rows

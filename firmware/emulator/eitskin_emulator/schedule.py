@@ -18,8 +18,8 @@ class Event:
 
 
 class Schedule:
-    """Events in order of time, then of when they were set. ``earlier`` is told each time that
-    something comes sooner."""
+    """Events in order of time, and at equal times in the order in which they were set. ``earlier``
+    is called whenever an earlier event is added."""
 
     def __init__(self) -> None:
         self._heap: list[tuple[int, int, Event]] = []
@@ -49,7 +49,7 @@ class Schedule:
         return NEVER
 
     def run_due(self, now: int) -> None:
-        """Let happen what is due at ``now`` or before, each called with its own time."""
+        """Run the events that are due at ``now`` or before; each is called with its own time."""
         while self.next_at() <= now:
             at, _, event = heapq.heappop(self._heap)
             event.at = NEVER

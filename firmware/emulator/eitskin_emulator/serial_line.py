@@ -23,7 +23,7 @@ class ByteRun:
     taken: int = 0
 
     def ended(self, at: int) -> int:
-        """How many bytes, of all, are whole at ``at``."""
+        """Return how many of all bytes are complete at ``at``."""
         return (
             0
             if at < self.first_end
@@ -54,7 +54,7 @@ class SerialLine:
     # ---- the host's end ----
 
     def send(self, data: bytes) -> None:
-        """The host sends ``data``, from now on or when what it sent before has left."""
+        """Send ``data`` from the host, from now on or after the bytes that it sent before."""
         if data:
             start = max(self._clock.now, self._host_free_at)
             self._host_free_at = start + len(data) * self.frame_ticks
@@ -92,8 +92,8 @@ class SerialLine:
         return _take(self._down, at), max(ends, default=0)
 
     def arrives(self, number: int) -> int:
-        """When the ``number``-th byte from here will be whole at the board; NEVER if so many are
-        not on their way."""
+        """Return when the ``number``-th byte from here will be complete at the board; NEVER if
+        fewer bytes are on their way."""
         for run in self._down:
             left = len(run.data) - run.taken
             if number <= left:

@@ -29,9 +29,9 @@ MAX_WALL_S = 120.0
 
 
 class EmulatedTransport(Transport):
-    """The host's end of the emulated board's serial line. ``board`` may be looked at, and
-    disturbed. ``loop``: the scene begins again at its end. Its last frame is held; the board goes
-    on."""
+    """The host's end of the emulated board's serial line. ``board`` can be inspected and disturbed.
+    With ``loop`` the scene begins again at its end; otherwise its last frame stays, and the board
+    continues."""
 
     def __init__(self, name: str, board: EmulatedBoard, *, loop: bool = False) -> None:
         self.url = self.name = f"emu:{name}"

@@ -1,4 +1,5 @@
-"""A sheet of the schematic: draws parts of the design by schemdraw, and knows what it has joined.
+"""A sheet of the schematic: draws parts of the design by schemdraw, and records the connections
+that it has drawn.
 
 A test compares what is joined with the netlist."""
 

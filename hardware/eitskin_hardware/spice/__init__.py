@@ -1,1 +1,1 @@
-"""The circuit in ngspice: macro models, the deck of a design, and what is measured on it."""
+"""The circuit in ngspice: macro models, the deck of a design, and its measurements."""

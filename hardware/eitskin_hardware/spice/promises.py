@@ -1,4 +1,5 @@
-"""The promises of docs/guide/hardware.md: what the page said before, what the simulation says."""
+"""The promises of docs/guide/hardware.md: the page's former text, and the results of the
+simulation."""
 
 import re
 from collections.abc import Mapping

@@ -1,5 +1,5 @@
-"""The stages of bring-up on the deck: what is measured at each, what it should be, and which stage
-names a mistake."""
+"""The stages of bring-up on the deck: the measurements of each, their expected values, and the
+stage that finds a mistake."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

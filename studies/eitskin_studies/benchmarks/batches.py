@@ -1,5 +1,5 @@
-"""Batches of frames over threads beside one frame after another: frames a second, in turns in one
-run."""
+"""Compare batches of frames on several threads with single frames, in frames per second, by turns
+in one run."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -55,7 +55,7 @@ def _batch(batch: Batch, frames: FloatArray) -> None:
 
 
 def _c_alone(blob: bytes, untouched: FloatArray, parts: list[FloatArray]) -> Callable[[], None]:
-    """One C call a thread: what the machine can give."""
+    """One C call per thread: the limit of the machine."""
     calls = []
     for part in parts:
         engine = CoreEngine(blob)

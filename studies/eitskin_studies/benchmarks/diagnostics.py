@@ -1,5 +1,5 @@
-"""How often what is wrong with a frame is called by its name, and what it costs the image, with the
-diagnostics and without.
+"""Count how often a fault of a frame is named correctly, and measure its effect on the image, with
+the diagnostics and without.
 
 Every frame is compared with the same one without the fault: same scene, contacts, noise and
 reference. Rules and thresholds were chosen under other seeds (docs/reference/diagnostics.md).

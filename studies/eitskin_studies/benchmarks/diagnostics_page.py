@@ -149,7 +149,7 @@ def false_alarms(result: Findings) -> str:
 
 
 def refused(rates: Sequence[DetectionRate]) -> str:
-    """How many frames were refused, by fault."""
+    """Return the number of rejected frames, by fault."""
     named = {f"{one.fault} at {one.snr_db:g} dB: {one.refused}" for one in rates if one.refused}
     return "; ".join(sorted(named)) or "none"
 

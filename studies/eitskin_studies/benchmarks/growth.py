@@ -235,7 +235,8 @@ def rows(result: GrowthTimes) -> list[tuple[str, ...]]:
 
 
 def exponent(points: Sequence[Growth], value: Callable[[Growth], float]) -> float:
-    """The slope of log ``value`` over the log of what is varied: 1 is in proportion."""
+    """Return the slope of log ``value`` over the log of the varied quantity; 1 means
+    proportional."""
     x, y = np.log([p.value for p in points]), np.log([value(p) for p in points])
     return float(np.polyfit(x, y, 1)[0])
 

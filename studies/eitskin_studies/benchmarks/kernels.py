@@ -1,5 +1,4 @@
-"""Each kernel of the C core on this processor beside the machine's measured peaks: how far from the
-limit it is.
+"""Compare each kernel of the C core on this processor with the machine's measured peaks.
 
 A kernel can be no faster than its data can be read from where they lie, than its
 multiply-accumulates can be done, or than its longest chain of dependent ones, since the order of

@@ -102,7 +102,7 @@ class Judged:
 
     @property
     def missed(self) -> int:
-        """Presses of which nothing was reported while they lasted."""
+        """Presses without a report while they lasted."""
         return self.presses - len(self.scan_ms)
 
 

@@ -146,7 +146,7 @@ class Row:
 
 @dataclass(frozen=True)
 class LimitResult:
-    """All lines, and what they were measured with."""
+    """All lines, and the conditions of their measurement."""
 
     settings: Settings
     model: str

@@ -121,8 +121,8 @@ print("\\n".join(sys.modules))
 
 
 def _peak_mb(scene: Scene, workspace: MeshCache) -> float:
-    """Return the most memory that Python holds while the scene is compiled and run, in MB, without
-    what was there before."""
+    """Return the peak of the memory that Python allocates while the scene is compiled and run, in
+    MB."""
     tracemalloc.start()
     simulate_frames(compile_scene(scene, mesh_cache=workspace))
     peak = tracemalloc.get_traced_memory()[1]

@@ -33,7 +33,7 @@ def add_board(what: Any) -> None:
 
 
 def run_board(options: argparse.Namespace) -> int:
-    """Count what a frame costs on the emulated board."""
+    """Count the cost of a frame on the emulated board."""
     from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import board as bench_board
 
@@ -76,7 +76,7 @@ def add_time(what: Any) -> None:
 
 
 def run_time(options: argparse.Namespace) -> int:
-    """Bound what a frame takes on the board."""
+    """Bound the time of a frame on the board."""
     from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import time_range
 
@@ -97,7 +97,7 @@ def add_energy(what: Any) -> None:
 
 
 def run_energy(options: argparse.Namespace) -> int:
-    """Estimate what a frame takes from the supply."""
+    """Estimate the energy of a frame."""
     from eitskin_studies.benchmarks import energy
 
     result = energy.run()

@@ -1,5 +1,5 @@
-"""``eitskin bench``: what is counted rightly: diagnostics, gestures, touches in other worlds, and
-touches beside their bound."""
+"""``eitskin bench``: counts of correct diagnostics, gestures and touches in other worlds, and
+touches compared with their bound."""
 
 import argparse
 import json
@@ -31,7 +31,7 @@ def add_diagnostics(what: Any) -> None:
 
 
 def run_diagnostics(options: argparse.Namespace) -> int:
-    """Count how often faults are named, and what they cost."""
+    """Count how often faults are named, and measure their cost."""
     from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import diagnostics as bench_diagnostics
     from eitskin_studies.benchmarks import diagnostics_page as bench_diagnostics_page

@@ -44,7 +44,7 @@ def cost(method: Method, dv: FloatArray) -> Cost:
 
 
 def kept_bytes(method: Method) -> int:
-    """Return what the method says that it keeps, or else the bytes of its arrays."""
+    """Return the bytes that the method reports to keep, or else the bytes of its arrays."""
     if isinstance(method, SaysWhatItKeeps):
         return method.kept_bytes
     return sum(one.nbytes for one in vars(method).values() if isinstance(one, np.ndarray))

@@ -1,4 +1,4 @@
-"""The methods that are compared: baselines, the C core, and those of other packages."""
+"""The compared methods: baselines, the C core, and methods of other packages."""
 
 from importlib.metadata import entry_points
 from importlib.util import find_spec

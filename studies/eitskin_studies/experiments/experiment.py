@@ -1,5 +1,5 @@
-"""Experiments, and the workspace of one: seeded and resumable, with every result kept as it
-comes."""
+"""Experiments, and their workspace: seeded and resumable, with every result kept as soon as it is
+computed."""
 
 import hashlib
 import math
@@ -28,7 +28,7 @@ MODEL_ELEMENTS = 6_000
 
 @dataclass(frozen=True)
 class ExperimentSettings:
-    """How much an experiment does.
+    """The size of an experiment.
 
     Attributes:
         seed: of the reported sets; sets for choosing have ``tuning_seed``, so that no number is
@@ -85,8 +85,8 @@ class ExperimentOutcome:
 
 @dataclass(eq=False)
 class Workspace:
-    """The place where an experiment works: its settings, its folder, and what is kept there. Use
-    :func:`workspace_in`."""
+    """The workspace of an experiment: its settings, its folder, and the results that are kept
+    there. Use :func:`workspace_in`."""
 
     settings: ExperimentSettings
     folder: Path
@@ -101,8 +101,8 @@ class Workspace:
         return {"version": __version__, "core": core}
 
     def kept(self, facts: Mapping[str, Any], make: Callable[[], Any]) -> Any:
-        """The JSON value that ``make`` gives for ``facts``: made once, then read, in this run and
-        in those that go on with it.
+        """Return the JSON value that ``make`` gives for ``facts``. It is computed once and then
+        read, in this run and in runs that continue it.
 
         ``facts`` must say all that the value depends on besides the code; the seed is added.
 
@@ -135,7 +135,7 @@ class Workspace:
         return made
 
     def scenes(self, skin: Skin, protocol: Scan, elements: int = SIMULATED_ELEMENTS) -> SceneSolver:
-        """Solves scenes on a mesh that no model is made on; what it solves is kept in the
+        """Return a solver of scenes on a mesh that no model uses; its solutions are kept in the
         folder."""
         return SceneSolver(skin, protocol, elements, self.folder / "frames")
 
@@ -146,7 +146,7 @@ class Experiment(Protocol):
     TITLE: str
 
     def run(self, workspace: Workspace) -> ExperimentOutcome:
-        """All of it; what the workspace has kept is not computed again."""
+        """Run the whole study; results that the workspace has kept are not computed again."""
 
 
 def workspace_in(folder: Path, settings: ExperimentSettings, progress: Progress) -> Workspace:

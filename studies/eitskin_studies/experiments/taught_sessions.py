@@ -1,5 +1,5 @@
-"""Streams of a taught skin: measured presses put one after another as a board would scan them, and
-what the tracker makes of their frames, beside each frame reconstructed by itself."""
+"""Streams of a taught skin: measured presses in sequence, as a board would scan them, and the
+tracker's results for their frames beside the results of each frame alone."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Reported events against what was done: right, invented, and how late."""
+"""Compare reported events with the true gestures: right, invented, and their latency."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -53,7 +53,7 @@ class GestureCount:
 
     @property
     def gestures(self) -> int:
-        """Done, without what is none."""
+        """Return the true gestures, without other events."""
         return sum(n for kind, n in self.done.items() if EXPECTED[kind])
 
     @property

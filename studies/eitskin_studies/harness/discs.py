@@ -1,4 +1,4 @@
-"""Equal discs at least so far apart."""
+"""Equal discs with a least distance."""
 
 from eitskin.errors import UsageError
 from eitskin.scene.random_touches import TouchRules, TouchSet, random_touches

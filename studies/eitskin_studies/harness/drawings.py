@@ -42,7 +42,7 @@ def file_of(page: Path) -> Path:
 
 def keep_drawings(page: Path, drawings: Mapping[str, Drawing]) -> None:
     """Store the numbers of pictures, by their files relative to the folder of ``page``; other
-    pictures of the page keep what they have.
+    pictures of the page keep their numbers.
 
     Raises:
         FileError: it cannot be written.

@@ -1,4 +1,5 @@
-"""The stored numbers behind pages: what a command filled a page's marks with, and at which commit.
+"""The stored numbers behind pages: the values with which a command filled a page's marks, and the
+commit.
 
 ``studies/results/numbers/PAGE.json`` holds them mark by mark, because a page may be filled by
 several commands. A test fills each page from its file again and compares. The README's numbers are
@@ -29,7 +30,8 @@ def file_of(page: Path) -> Path:
 
 
 def keep_numbers(page: Path, name: str, filling: tuple[Any, Any]) -> None:
-    """Store what ``page`` was filled with, with the commit; other marks keep what they have.
+    """Store the values that ``page`` was filled with, and the commit; other marks keep their
+    values.
 
     Raises:
         FileError: it cannot be written.

@@ -63,7 +63,7 @@ class FrameSession:
 
     @property
     def scenes(self) -> int:
-        """How many."""
+        """The number of scenes."""
         return len(self.exact_v)
 
     @cached_property

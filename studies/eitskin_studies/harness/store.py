@@ -1,5 +1,5 @@
-"""Results as they come, a JSON line each: a run that is cut, even by kill -9, goes on from its last
-whole line."""
+"""Results, one JSON line each, written as soon as they are computed: an interrupted run, even after
+kill -9, continues from its last complete line."""
 
 import hashlib
 import json

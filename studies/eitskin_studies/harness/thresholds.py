@@ -1,4 +1,4 @@
-"""Thresholds as they are chosen on training scenes, a method each: of images, and of touches in
+"""Thresholds that are chosen on training scenes, for each method: of images, and of touches in
 them.
 
 The fraction t of touches is not the one that MIoU uses; it is that of the highest share of exactly

@@ -1,5 +1,5 @@
-"""The experiment ``algorithms`` as pictures: images, what a threshold makes of them, curves, bars
-beside the paper's."""
+"""The pictures of the experiment ``algorithms``: images, the same with a threshold, curves, and
+bars beside the paper's."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""One picture an effect: its law on the left, on the right what it adds to a frame.
+"""One picture per effect: its law on the left, and its change of a frame on the right.
 
 The frame is that of a press on the paper's skin, or on a forearm's if the effect is for skins that
 cover a surface; on the right stands the frame with the effect minus the frame without it.

@@ -18,8 +18,7 @@ COLUMNS = 4
 
 
 def draw_waveforms(path: Path, *, rows: Sequence[Row]) -> None:
-    """The first session of each case that is told apart by eye, over the skin with nothing uneven,
-    drive by drive.
+    """Draw the first session of each case that differs visibly, over the even skin, drive by drive.
 
     Raises:
         MissingExtraError: matplotlib is not installed.

@@ -144,8 +144,8 @@ def draw_gallery(path: str | Path, skin: Skin, examples: Sequence[Example]) -> N
 
 
 def draw_ambiguity(path: str | Path, ambiguities: Ambiguities) -> None:
-    """What ``crowded`` and the score are worth, by what can be known of a frame; mixed test scenes,
-    the usual variant.
+    """Draw how well ``crowded`` and the score predict errors, by a frame's features; mixed test
+    scenes, the default variant.
 
     Raises:
         MissingExtraError: matplotlib is not installed.

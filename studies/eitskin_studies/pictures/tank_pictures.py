@@ -31,8 +31,8 @@ SHORT = (
 def draw_gallery(
     path: str | Path, evaluation_sets: EvaluationSets, results: Sequence[dict[str, Any]], both: bool
 ) -> None:
-    """A row a frame, a column a method, truth first, as a PNG; all frames and the rods where
-    ``both`` signs are shown, else those of metal.
+    """Draw a row per frame and a column per method, truth first, as a PNG; with ``both`` signs all
+    frames and rods, else those of metal.
 
     Raises:
         MissingExtraError: matplotlib is not installed.

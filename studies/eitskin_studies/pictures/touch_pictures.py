@@ -1,4 +1,4 @@
-"""One picture a touch's law or shape: what it is, and what it makes of a frame.
+"""One picture per law or shape of a touch: the law or shape itself, and its effect on a frame.
 
 On the right stands the frame of a press on the paper's skin: of a law minus the untouched one, of a
 shape minus that of the disc. ``eitskin draw touch NAME -o PNG`` makes one picture.

@@ -1,5 +1,5 @@
-"""All methods on equal scans: what the configurations and the other methods of a front reach on
-each scan at each SNR, and what a frame takes."""
+"""All methods on equal scans: the accuracy of a front's configurations and other methods on each
+scan at each SNR, and the time of a frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

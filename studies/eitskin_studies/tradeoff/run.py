@@ -1,5 +1,5 @@
 """The whole measurement: train, score, count and time every configuration; each result is kept as
-it comes."""
+soon as it is measured."""
 
 import hashlib
 from collections.abc import Callable, Sequence
@@ -37,7 +37,7 @@ RESULTS = "results.jsonl"
 
 @dataclass(frozen=True)
 class RunSettings:
-    """How much is measured.
+    """The extent of the measurement.
 
     Attributes:
         scenes, train_scenes, set_scenes: of the set "random", of "train", and of each other set.

@@ -1,4 +1,4 @@
-"""How well touches are found in sets of other worlds, by whatever finds them.
+"""Score how well touches are found in sets of other worlds, by any method.
 
 The rule is that of ``eitskin.scoring.matching``: touches are paired with true ones within 10 mm, as
 many as possible, then the nearest; a scene is exact where nothing is left over on either side.

@@ -1,2 +1,2 @@
-"""The parts at the processor's pins: generator, multiplexers, skin, converter's input; each says
-what it leaves out."""
+"""The parts at the processor's pins: generator, multiplexers, skin, converter's input; each module
+states what it leaves out."""

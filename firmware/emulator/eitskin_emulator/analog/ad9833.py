@@ -1,5 +1,5 @@
-"""The AD9833 waveform generator (data sheet Rev. G): decodes what is really shifted in, and gives
-its output at any times.
+"""The AD9833 waveform generator (data sheet Rev. G): decodes the bits that are shifted in, and
+gives its output at any time.
 
 A bit is taken at each falling edge of SCLK while FSYNC is low; 16 make a word, fewer are forgotten
 when FSYNC rises (figure 4). In SPI modes 0 and 3 data changes at that very edge: the emulator lets
@@ -33,7 +33,7 @@ WAVEFORMS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "triangle": lambda turn: 1 - 4 * np.abs(turn - 0.5),
     "square": lambda turn: np.where(
         turn < 0.5, -1.0, 1.0
-    ),  # the top bit; halved in frequency (DIV2 = 0) is not told apart
+    ),  # the top bit; a square at half the frequency (DIV2 = 0) is not distinguished
 }
 
 

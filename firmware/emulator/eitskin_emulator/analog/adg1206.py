@@ -52,7 +52,7 @@ class Multiplexers:
         self._follow(at)
 
     def set_enables(self, at: int, enable: int) -> None:
-        """The eight enables, those of electrodes 0 to 15 lowest."""
+        """Set the eight enables; those of electrodes 0 to 15 are the lowest bits."""
         for k, name in enumerate(NAMES):
             if self._enable & ~enable & 0x11 << k:
                 self._off_at[k] = at
@@ -62,8 +62,8 @@ class Multiplexers:
         self._follow(at)
 
     def release(self, at: int) -> None:
-        """All lines float at once: the processor is reset. That is no switching order of the
-        program's."""
+        """Let all lines float at once, because the processor is reset. This does not count as a
+        switching order of the program."""
         self._address = self._enable = 0
         self._off_at = [at] * 4
         self._follow(at)

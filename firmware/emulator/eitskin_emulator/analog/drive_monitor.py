@@ -1,5 +1,5 @@
-"""Watches what the firmware does to current, at every write that reaches multiplexers or generator
-(``tests/firmware`` and ``sim:`` have the same in C). A test that meets a violation fails with its
+"""Checks the firmware's control of the current at every write to multiplexers or generator
+(``tests/firmware`` and ``sim:`` have the same in C). A violation makes a test fail with its
 sentence:
 
 - I+ and I-, or V+ and V-, are on one electrode.

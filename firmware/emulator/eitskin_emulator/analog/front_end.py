@@ -1,4 +1,5 @@
-"""Generator, multiplexers, skin and converter together: what the converter sees at given times.
+"""Generator, multiplexers, skin and converter together: the voltages at the converter at given
+times.
 
 The amplitude goes from one row's to the next one's as exp(-t / tau), tau = 1.5 us: source, cables,
 skin and amplifier as one first-order lag. Sixteen microseconds leave 2e-5 of a step.

@@ -23,7 +23,7 @@ Joined = tuple[int | None, int | None, int | None, int | None]
 
 
 class Rows(TypingProtocol):
-    """Frames by number: an array (n, m), or what makes them as they are asked for."""
+    """Frames by number: an array (n, m), or an object that computes them on request."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, frame: int, /) -> FloatArray: ...
@@ -33,7 +33,7 @@ class Moving(Rows, TypingProtocol):
     """Frames that depend on when their rows are read."""
 
     def at(self, frame: int, time_s: float) -> FloatArray:
-        """All rows (m,) as they are ``time_s`` after the scene began."""
+        """Return all rows (m,) at ``time_s`` after the beginning of the scene."""
         ...
 
 
@@ -112,8 +112,8 @@ class AnalogSkin:
 
 
 def rows_of(protocol: Protocol) -> dict[tuple[int, int, int, int], tuple[int, int]]:
-    """Row and sign of all electrodes [I+, I-, V+, V-] that the protocol's rows tell of, exchanged
-    or turned round."""
+    """Return row and sign for all electrodes [I+, I-, V+, V-] that follow from the protocol's rows,
+    with exchanged pairs or reversed signs."""
     found: dict[tuple[int, int, int, int], tuple[int, int]] = {}
     table = protocol.drive_measure.tolist()
     for a, b, c, d, row in [(*row, k) for k, row in enumerate(table)]:

@@ -165,7 +165,7 @@ class Adc(Registers):
         self._seen = max(self._seen, at)
 
     def _heard(self, times: IntArray) -> IntArray:
-        """The waiting triggers and those of ``times`` that do not fall into a conversion."""
+        """Return the waiting triggers and those of ``times`` that do not fall into a conversion."""
         length = self._conversion_ticks()
         if times[0] >= self._last + length and (len(times) < 2 or times[1] - times[0] >= length):
             self._last = int(times[-1])

@@ -73,7 +73,7 @@ class DmaStream:
         )
 
     def put(self, data: bytes) -> int:
-        """Move items from the peripheral to memory; tells how many were taken before the stream
+        """Move items from the peripheral to memory. Returns how many were taken before the stream
         ended."""
         size, taken = self.item_bytes, 0
         items = len(data) // size
@@ -90,7 +90,7 @@ class DmaStream:
         return taken
 
     def get(self, items: int) -> bytes:
-        """Move up to so many items from memory to the peripheral."""
+        """Move up to the given number of items from memory to the peripheral."""
         out = bytearray()
         size = self.item_bytes
         while items > 0 and self.enabled:
@@ -131,8 +131,8 @@ class DmaStream:
 
 
 class Dma:
-    """Eight streams. ``users`` bring what they have to move up to date; they are called before the
-    program looks."""
+    """Eight streams. ``users`` update their data for transfers; they are called before the program
+    reads."""
 
     whole_words = True
 

@@ -38,8 +38,8 @@ RESET_VALUES = {ACR: 0, KEYR: 0, OPTKEYR: 0, SR: 0, CR: LOCK, OPTCR: 0xFFFFAAFD,
 
 
 class FlashInterface(Registers):
-    """0x40023C00. ``stall`` stops the processor for so many ticks; ``after_slice`` ends the slice,
-    then calls its argument.
+    """0x40023C00. ``stall`` stops the processor for a number of ticks; ``after_slice`` ends the
+    slice, then calls its argument.
 
     ``word_programmed`` is called after each word.
     """

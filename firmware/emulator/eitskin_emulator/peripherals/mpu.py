@@ -55,7 +55,7 @@ class MpuRegion:
 
 
 class Mpu:
-    """Regions, of which the last that covers an address counts."""
+    """The regions; the last one that covers an address applies."""
 
     def __init__(self, memories: Memories) -> None:
         self._memories = memories

@@ -1,4 +1,5 @@
-"""A peripheral of plain 32-bit registers: what is written is kept, what is unknown is recorded."""
+"""A peripheral of plain 32-bit registers: written values are kept, and unknown registers are
+recorded."""
 
 from collections.abc import Mapping
 
@@ -31,7 +32,7 @@ class Registers:
             self.values[offset] = value
 
     def unmodelled(self, what: str) -> None:
-        """Record that the program asks for what the emulator does not do."""
+        """Record that the program uses a function that is not modelled."""
         self.record.unmodelled[f"{self.name}: {what}"] += 1
 
     def hazard(self, what: str) -> None:

@@ -69,8 +69,8 @@ class SystemSpace:
     # ---- faults ----
 
     def fault(self, number: int, status: int, address: int | None = None) -> int | None:
-        """Note a fault of kind ``number`` with its bits of CFSR; tells which exception is taken,
-        None: the processor locks up."""
+        """Note a fault of kind ``number`` with its bits of CFSR. Returns the exception that is
+        taken; None: the processor locks up."""
         self.cfsr |= status
         if address is not None and number == MEMORY_FAULT:
             self.mmfar, self.cfsr = address, self.cfsr | MMARVALID

@@ -34,8 +34,8 @@ class SpiFrame:
 
 
 class Spi(Registers):
-    """``sent`` gets every frame when its last bit is out; ``connected`` tells whether clock and
-    data reach their pins."""
+    """``sent`` gets every frame after its last bit; ``connected`` returns whether clock and data
+    reach their pins."""
 
     whole_words = False
 

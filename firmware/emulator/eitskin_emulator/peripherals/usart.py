@@ -43,7 +43,7 @@ RESET_VALUES = {
 
 
 class Usart(Registers):
-    """USART3 on DMA1; ``tx_connected`` and ``rx_connected`` tell whether its pins are in their
+    """USART3 on DMA1; ``tx_connected`` and ``rx_connected`` return whether its pins have that
     function."""
 
     name, base = "USART3", 0x40004800

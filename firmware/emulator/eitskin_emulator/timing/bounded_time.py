@@ -45,7 +45,7 @@ APB1, APB2, AHB = (0x40000000, 0x40010000, 0x40020000)
 
 @dataclass
 class TimeSpent:
-    """Half cycles since the bound was attached, by what they went to."""
+    """Half cycles since the bound was attached, by their use."""
 
     issue: int = 0
     code_lines: int = 0

@@ -113,8 +113,9 @@ def paired_half_cycles(steps: list[Step], bound: Bound) -> int:
 def waiting_half_cycles(
     steps: list[Step], bound: Bound, late: dict[int, int]
 ) -> tuple[int, dict[int, int]]:
-    """Half cycles at one instruction per cycle, each waiting for its operands, of which ``late``
-    come so many cycles after the block's start; and what is late at its end."""
+    """Return the half cycles at one instruction per cycle, if each waits for its operands, and the
+    operands that are still late at the end. ``late`` are the operands that come only some cycles
+    after the block's start."""
     ready, now = dict(late), 0
     for one in steps:
         now = max([now, *(ready[k] for k in one.reads if k in ready)])

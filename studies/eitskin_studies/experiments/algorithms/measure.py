@@ -1,5 +1,5 @@
 """The measurements: curves of MIoU over the threshold, positions, counts and MACs, in parts that
-are kept as they come."""
+are kept as soon as they are computed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

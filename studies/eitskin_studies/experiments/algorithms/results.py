@@ -91,7 +91,7 @@ def column(curves: FloatArray, t: float) -> FloatArray:
 
 
 def result_of(field: Field, candidate: Candidate) -> AlgorithmResult:
-    """All of a method; what is kept is read."""
+    """Return all results of a method; results that are kept are read."""
     chosen = choose(field, candidate)
     tuned = {
         value: tuning_curves(field, candidate, value)[metrics.LOOKUP] for value in candidate.values

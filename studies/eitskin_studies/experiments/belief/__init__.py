@@ -1,5 +1,5 @@
-"""Whether what the core says of its touches is true: how sure it is of each, where each is, and
-when the count is uncertain."""
+"""Check the core's statements about its touches: the confidence of each, its place, and whether the
+count is uncertain."""
 
 import hashlib
 from typing import Any
@@ -62,7 +62,8 @@ def run(workspace: Workspace) -> ExperimentOutcome:
 
 
 def _drawn(sets: Sets) -> dict[str, Any]:
-    """What the picture shows: the curve, and the coverage of sets with touches that were found."""
+    """Return the content of the picture: the curve, and the coverage of sets in which touches were
+    found."""
     shares = {name: coverage(frames) for name, frames in sets.items()}
     return {
         "curve": [[part.said, _numbers(part.true)] for part in curve(sets)],

@@ -94,7 +94,7 @@ def curve_table(sets: Sets) -> Table:
 
 
 def places_table(sets: Sets) -> Table:
-    """How many places lie in their ellipses, a row a set."""
+    """The fraction of places inside their ellipses, one row per set."""
     rows = []
     for name, frames in sets.items():
         touches = [t for frame in frames for t in frame["touches"] if t[0] and t[3] is not None]

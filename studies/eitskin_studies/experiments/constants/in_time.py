@@ -1,4 +1,5 @@
-"""Judging scenes whose touches go on in time: sessions of gestures, and the fast path's scans."""
+"""Evaluation scenes whose touches extend over time: sessions of gestures, and the fast path's
+scans."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -46,7 +47,7 @@ class GestureScene:
         return self.frames.name
 
     def play(self, runner: Runner) -> Played:
-        """As a board follows them."""
+        """Run the scene in the way a board follows touches."""
         macs, found = 0, self.found
         if found is None:
             results = solved(runner.engine(self.frames.blob), self.frames)
@@ -138,7 +139,7 @@ class FastScene:
 
 
 class _Keeper(Player):
-    """Keeps what it is given instead of playing it."""
+    """Keeps its scenes instead of running them."""
 
     given: tuple[Scan, FloatArray, Sequence[TrueInTime]]
     tare_v: FloatArray

@@ -91,7 +91,7 @@ class Scene(Protocol):
     def module(self) -> str | None: ...
 
     def play(self, runner: "Runner") -> Played:
-        """By the core as it is now."""
+        """Run the scenes with the present core."""
 
 
 class Runner:

@@ -1,5 +1,5 @@
-"""Finds the C tests that fail if a constant is halved or doubled: a constant that changes no
-judging scene may be what a promise rests on.
+"""Finds the C tests that fail if a constant is halved or doubled: a promise may depend on a
+constant that changes no evaluation scene.
 
 The tests of the preset `host` take the core from a shared library. They are run with a variant in
 its place, whose constants an environment variable sets. A test is run only where it uses the

@@ -282,7 +282,8 @@ def _solvers(worlds: Sequence[FrameScene]) -> Iterator[FrameScene]:
 
 
 def _left_out(worlds: Sequence[FrameScene], protocol: Protocol) -> Iterator[FrameScene]:
-    """Rows that are masked: one, those of one electrode and of three."""
+    """Return sets of masked rows: one row, those of one electrode, and those of three
+    electrodes."""
     pairs = protocol.drive_measure
     for electrodes in ((), (3,), (3, 4), (3, 8, 12)):
         masked = np.asarray(np.isin(pairs, electrodes).any(axis=1))

@@ -1,4 +1,4 @@
-"""Streams of frames with fingers that come, press, move and lift, and what was truly there."""
+"""Streams of frames with fingers that land, press, move and lift, and their truth."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

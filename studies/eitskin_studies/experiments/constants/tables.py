@@ -157,7 +157,7 @@ def words_of(
     scenes: Sequence[Scene],
     facts: Mapping[str, Any],
 ) -> dict[str, str]:
-    """Return a text about what was run."""
+    """Return a text about the run."""
     whole = [one.name for one in constants if one.module != "fast"]
     some = next((one.before for name in whole for one in effects[name] if one.before), {})
     return {

@@ -34,7 +34,8 @@ USUAL, SNR_DB, UNTOUCHED = 100, 60.0, 50
 
 
 def deformations(thickness_mm: float) -> dict[str, EvenDeformation]:
-    """Those of the page; a bend is the stretch between held sides that conducts alike."""
+    """Return the deformations of the page. A bend is represented by the stretch between held sides
+    that has the same conductance."""
     found = {"flat": EvenDeformation()}
     for percent in (5, 10, 20):
         along = 1 + percent / 100
@@ -47,7 +48,7 @@ def deformations(thickness_mm: float) -> dict[str, EvenDeformation]:
 
 
 def run(workspace: Workspace) -> ExperimentOutcome:
-    """All of it; what the workspace has kept is not computed again."""
+    """Run the whole study; results that the workspace has kept are not computed again."""
     settings = workspace.settings
     model, blob = load_prebuilt()
     skin, seed = model.skin, settings.seed

@@ -1,5 +1,5 @@
-"""Scans measured: frames of any pattern out of the scenes' transfer matrices, their models, and
-what is found with them."""
+"""Measured scans: frames of any pattern from the scenes' transfer matrices, their models, and the
+touches that are found with them."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass

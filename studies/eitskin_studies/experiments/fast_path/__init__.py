@@ -1,4 +1,4 @@
-"""Touches that land, move and lift while rows are measured: what the fast path says after each
+"""Touches that land, move and lift while rows are measured: the reports of the fast path after each
 drive."""
 
 from collections import Counter
@@ -93,7 +93,7 @@ def rows() -> list[Row]:
 
 
 def run(workspace: Workspace) -> ExperimentOutcome:
-    """All of it; what the workspace has kept is not computed again."""
+    """Run the whole study; results that the workspace has kept are not computed again."""
     settings = workspace.settings
     model, blob = load_prebuilt()
     drawn: dict[str, States] = {}
@@ -280,7 +280,7 @@ def _with(player: Player, scan: Scan, rng: np.random.Generator) -> BoolArray:
 def _open(
     volts: FloatArray, player: Player, scan: Scan, sigma: float, rng: np.random.Generator
 ) -> FloatArray:
-    """No current flows by way of it, and it floats where it is measured."""
+    """Open an electrode: no current flows through it, and it floats where it is measured."""
     drives, measures = _with(player, scan, rng).T
     floating = 0.3 * float(rng.uniform(-1, 1)) * float(np.abs(volts).max())
     return np.where(drives, 0.0, np.where(measures, floating, volts))
@@ -328,7 +328,8 @@ def _summary(outcomes: list[Outcome], fault: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _unfounded(found: list[dict[str, Any]]) -> str:
-    """How many frames without a fault have a diagnostic, and drives with one a false touch."""
+    """Count the frames without a fault that have a diagnostic, and the drives with one that have a
+    false touch."""
     spoiled = [one for one in found if one["fault"]]
     drives, false = (sum(one[key] for one in spoiled) for key in ("drives", "false_drives"))
     quiet = [one for one in found if not one["fault"] and one["fingers"] <= one["scenes"]]

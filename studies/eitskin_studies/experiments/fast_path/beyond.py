@@ -157,7 +157,7 @@ def _apart(
     least_mm: float = 35.0,
     most_mm: float = np.inf,
 ) -> FloatArray:
-    """Places each so far from the next ones."""
+    """Return places with the given distance between neighbours."""
     while True:
         places = np.array([place_on(skin, rng) for _ in range(count)])
         away = np.linalg.norm(places[:, None] - places[None], axis=2)[np.triu_indices(count, 1)]
@@ -221,7 +221,7 @@ def _creeping(places: FloatArray, begin_s: float) -> Paths:
 
 
 def _crossing(places: FloatArray, begin_s: float) -> Paths:
-    """The second finger comes to the crossing so much later."""
+    """Return two crossing fingers; the second one comes to the crossing later by the given time."""
     moves_s, listed = CROSSING_MM / CROSSING_MM_PER_S, []
     for k, (here, there) in enumerate((places[:2], places[2:])):
         from_s = begin_s + k * CROSSING_APART_S

@@ -43,7 +43,7 @@ def order(fast: FastCore) -> list[int]:
 
 @dataclass(frozen=True)
 class TrueInTime:
-    """A finger from ``from_s`` to ``to_s``, and where it is."""
+    """A finger from ``from_s`` to ``to_s``, and its place."""
 
     from_s: float
     to_s: float

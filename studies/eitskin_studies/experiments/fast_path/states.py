@@ -1,4 +1,4 @@
-"""Skins whose contacts were drawn, with drawn places on them, and what a scan measures there while
+"""Skins with random contacts and random places on them, and the scans that are measured while
 touches land, move and lift: scenes."""
 
 from collections.abc import Callable, Sequence

@@ -36,7 +36,7 @@ SNRS_DB = (40.0, 50.0, SNR_DB, AVERAGED_DB, 84.0)
 
 
 def run(workspace: Workspace) -> ExperimentOutcome:
-    """All of it; what the workspace has kept is not computed again."""
+    """Run the whole study; results that the workspace has kept are not computed again."""
     settings, skin = workspace.settings, paper_skin()
     protocol = adjacent(skin.electrodes.count)
     radius_mm = (skin.outline.diameter_mm or 0.0) / 2

@@ -54,7 +54,7 @@ class Anywhere:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """For the store; what is NaN becomes null."""
+        """Return a dictionary for the store; NaN becomes null."""
 
         def plain(values: FloatArray) -> list[list[float | None]]:
             return [[None if v != v else v for v in row] for row in values.tolist()]

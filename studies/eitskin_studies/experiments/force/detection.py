@@ -69,7 +69,7 @@ class Detection:
         return least_weight(self.loads_g, hits / tries), float(low), float(high)
 
     def threshold_text(self, radius: int) -> str:
-        """As words."""
+        """Return the threshold in words."""
         weight, low, high = self.threshold(radius)
         if weight == float("inf"):
             return f"more than {grams_text(self.loads_g[-1])} g"

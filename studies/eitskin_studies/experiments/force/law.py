@@ -63,8 +63,8 @@ NOMINAL = PressLaw()
 
 @dataclass(frozen=True)
 class SheetLaw(PressLaw):
-    """A weight on a round metal sheet, as in the paper; of 11 mm, so that 200 g stay below what the
-    paper's gel stands."""
+    """A weight on a round metal sheet, as in the paper. Its radius is 11 mm, so that 200 g stay
+    below the limit of the paper's gel."""
 
     sheet_mm: float = 11.0
 
@@ -83,7 +83,7 @@ GEL_LIMIT_KPA = 5.41  # the paper's gel
 
 
 def drawn_laws(seed: int, count: int) -> tuple[PressLaw, ...]:
-    """``count`` skins and tips; the first ones are those of a lesser count."""
+    """Draw ``count`` skins and tips; the first ones are those of a smaller count."""
     laws = []
     for k in range(count):
         normal = stream(seed, "force law", k).standard_normal(len(DEVIATION))

@@ -112,7 +112,7 @@ def _strongest(result: Reconstruction) -> tuple[float, float, float]:
 
 
 def as_lists(readouts: Mapping[str, Readout]) -> dict[str, object]:
-    """For the store; what is NaN becomes null."""
+    """Return lists for the store; NaN becomes null."""
 
     def plain(values: FloatArray) -> list[object]:
         return [None if v != v else v for v in values.tolist()]

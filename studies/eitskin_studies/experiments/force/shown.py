@@ -1,4 +1,4 @@
-"""What the pictures of the force study show, as plain values."""
+"""The content of the force study's pictures, as plain values."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -58,7 +58,7 @@ def kinds() -> list[Kind]:
 
 
 def run(workspace: Workspace) -> ExperimentOutcome:
-    """All of it; what the workspace has kept is not computed again."""
+    """Run the whole study; results that the workspace has kept are not computed again."""
     settings, (_, blob) = workspace.settings, load_prebuilt()
     listed = [(number, one, settings.count(one.count)) for number, one in enumerate(kinds())]
     todo = [(number, one, k) for number, one, count in listed for k in range(count)]
@@ -102,7 +102,7 @@ def _diagnosed(name: str, blob: bytes) -> dict[str, int]:
 
 
 def diagnosed(messages: Sequence[Any]) -> Counter[str]:
-    """How many ``frames`` a stream has, and how many of them each diagnostic."""
+    """Return the number of ``frames`` of a stream, and how many of them have each diagnostic."""
     counted: Counter[str] = Counter()
     for message in messages:
         if hasattr(message, "diagnostics"):

@@ -1,5 +1,5 @@
-"""The waveform of an untouched skin (the paper's Fig. 4b): how even it is, what makes it uneven,
-what the doctor says of it."""
+"""The waveform of an untouched skin (the paper's Fig. 4b): its evenness, the causes of unevenness,
+and the doctor's findings."""
 
 from functools import partial
 from typing import Any

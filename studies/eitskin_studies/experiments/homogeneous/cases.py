@@ -1,4 +1,4 @@
-"""Untouched skins, each with something that makes it uneven, and what the doctor says of them."""
+"""Untouched skins, each with one cause of unevenness, and the doctor's findings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

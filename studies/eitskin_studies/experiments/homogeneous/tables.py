@@ -61,7 +61,7 @@ class Row:
 
 
 def tables(rows: Sequence[Row]) -> tuple[Table, ...]:
-    """How even each case is, and what the doctor says of it."""
+    """The evenness of each case, and the doctor's findings."""
     even = tuple(
         (row.name, *(_interval(row.values(m)) for m in MEASURES), str(len(row.uniformities)))
         for row in rows

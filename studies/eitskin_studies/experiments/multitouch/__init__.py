@@ -1,5 +1,5 @@
-"""Two to twelve touches: counts, positions, and when the core says that it cannot tell (the paper's
-Fig. 12 and Table 1)."""
+"""Two to twelve touches: counts, positions, and the frames that the core reports as uncertain (the
+paper's Fig. 12 and Table 1)."""
 
 from dataclasses import asdict
 from typing import Any
@@ -24,7 +24,7 @@ TITLE = "Many touches at once: how many, where, and when to say that it cannot b
 
 
 def run(workspace: Workspace) -> ExperimentOutcome:
-    """All of it; what the workspace has kept is not computed again.
+    """Run the whole study; results that the workspace has kept are not computed again.
 
     Raises:
         FileError: the workspace's folder cannot be written.

@@ -1,5 +1,4 @@
-"""The honest "cannot tell": how well ``crowded`` is calibrated, and a linear score that may do
-better.
+"""Reporting uncertainty: the calibration of ``crowded``, and a linear score that may be better.
 
 The score is w . f + b with features that the core can compute without a logarithm or an
 exponential; it is fitted as a logistic regression (Cox 1958) on tuning scenes to whether a frame is
@@ -36,7 +35,7 @@ BINS = 10
 
 @dataclass(frozen=True)
 class ScoredFrame:
-    """A frame, what came of it, and by what it could have been known. ``found`` touches;
+    """A frame, its result, and the features that could predict the result. ``found`` touches;
     ``nearest`` pair's distance over the sum of its radii (inf where there is none)."""
 
     snr_db: float

@@ -118,7 +118,7 @@ def chance_table(ambiguities: Ambiguities) -> Table:
 
 
 def touch_score_table(ambiguities: Ambiguities) -> Table:
-    """How well a touch's own numbers tell true from false touches."""
+    """How well a touch's own numbers separate true from false touches."""
     rows = []
     for name in NAMES:
         one = ambiguities.touches[name]

@@ -1,5 +1,5 @@
-"""How well touches are counted and placed: shares with their Wilson intervals, errors with
-bootstrap ones."""
+"""The accuracy of counts and places: fractions with Wilson intervals, errors with bootstrap
+intervals."""
 
 import math
 from collections.abc import Sequence

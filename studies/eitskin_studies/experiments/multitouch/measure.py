@@ -217,8 +217,8 @@ def _pairs(
 
 
 def prepare_mixed(touch_data: TouchData, workspace: Workspace) -> None:
-    """Mixed scenes, solved and counted part by part, so that a run that is cut goes on with the
-    next."""
+    """Solve and count mixed scenes part by part, so that an interrupted run continues with the next
+    part."""
     for cell in workspace.progress(mixed_cells(), f"{MIXED} scenes"):
         for tuning in (True, False):
             for variant in VARIANTS:

@@ -73,8 +73,8 @@ def kmac(score: Score) -> str:
 
 
 def verdict(value: float, best: float, worst: float, asked: float, more: bool = True) -> str:
-    """Whether a value is what was asked, and whether its interval is to its ``worst`` end, or
-    reaches it at its ``best``."""
+    """Return whether a value meets its requirement, and whether its interval does so at its
+    ``worst`` end, or only at its ``best``."""
     sign = 1 if more else -1
     if sign * value >= sign * asked:
         return "yes" if sign * worst >= sign * asked else "yes, but not its whole interval"

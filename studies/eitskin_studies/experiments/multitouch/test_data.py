@@ -118,7 +118,7 @@ class TouchData:
         }
 
     def method(self, name: str) -> Method:
-        """A classical method, as it was trained."""
+        """A trained classical method."""
         if name not in self._methods:
             self._methods[name] = self._families[name].make(self.trained(name).value)
         return self._methods[name]

@@ -93,7 +93,7 @@ def _share(value: float) -> str:
 
 
 def fails_table(scores: Scores) -> Table:
-    """Sets of which fewer than 90 % of the scenes are exact, the worst first."""
+    """The sets with fewer than 90 % exact scenes, the worst first."""
     return Table("fails", HEAD, tuple(map(_row, sorted(_failing(scores), key=_exact))))
 
 
@@ -131,7 +131,7 @@ def summary(scores: Scores) -> str:
 
 
 def conditions(settings: ExperimentSettings, count: int, knows_errors: bool) -> str:
-    """How the numbers were made; ``knows_errors``: the model says what it may be wrong by."""
+    """The conditions of the numbers; ``knows_errors``: the model states its errors."""
     guards = (
         ""
         if knows_errors

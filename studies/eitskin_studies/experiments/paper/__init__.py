@@ -42,7 +42,7 @@ GAUSS_NEWTON, FISTA = (3e-6, 0.4), (0.003, 0.3)
 
 
 def run(workspace: Workspace) -> ExperimentOutcome:
-    """All of it; what the workspace has kept is not computed again."""
+    """Run the whole study; results that the workspace has kept are not computed again."""
     model, blob = load_prebuilt()
     skin, seed = model.skin, workspace.settings.seed
     solver = workspace.scenes(skin, model.protocol)

@@ -1,5 +1,5 @@
-"""What each drive pattern is worth when noise comes in volts, from the converter, or from both,
-with one gain or a gain for each row: the bound of a touch's place, and the product's touches."""
+"""Compare drive patterns with noise in volts, from the converter, or both, with one gain or a gain
+for each row: by the bound of a touch's place, and by the product's touches."""
 
 from collections.abc import Mapping
 from dataclasses import asdict

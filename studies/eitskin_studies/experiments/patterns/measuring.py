@@ -1,4 +1,4 @@
-"""Measure what the bound allows and what the product finds, by pattern and by noise."""
+"""Compute the bound and measure the product's touches, by pattern and by noise."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass

@@ -1,4 +1,4 @@
-"""How much noise each row has, by what makes it, and by the gain in front of the converter."""
+"""The noise of each row, by its source and by the gain in front of the converter."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,5 @@
-"""One shape measured: its model, random touches on it, what was found of them."""
+"""The measurement of one shape: its model, random touches on it, and the touches that were
+found."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -31,7 +31,7 @@ LOST_HEAD = (
 
 
 def all_tables(measured: Mapping[str, tuple[ShapeVariant, Mapping[str, Any]]]) -> tuple[Table, ...]:
-    """The skins, what was found on them, and where."""
+    """The skins, and the touches that were found on them."""
     both = list(measured.values())
     return (
         Table("skins", SKINS_HEAD, tuple(_skin_row(*one) for one in both)),

@@ -56,7 +56,7 @@ PROTOCOL = adjacent(ELECTRODES)
 
 
 def run(workspace: Workspace) -> ExperimentOutcome:
-    """All of it; what the workspace has kept is not computed again."""
+    """Run the whole study; results that the workspace has kept are not computed again."""
     steps: list[tuple[str, Any]] = [("flat disk", partial(_surface, workspace, "flat disk"))]
     steps += [(name, partial(_unrolled, workspace, name)) for name in UNROLLED]
     steps += [(name, partial(_surface, workspace, name)) for name in CURVED]
@@ -180,7 +180,8 @@ def _scored(
 
 @dataclass(frozen=True, eq=False)
 class Skins:
-    """A skin and its surface as the model has them, and as they are: another triangulation."""
+    """A skin and its surface, as the model has them and as they really are, with another
+    triangulation."""
 
     skin: Skin
     surface: SurfaceMap

@@ -39,8 +39,8 @@ class Shown:
 
 
 class Imager(Protocol):
-    """Frames to images; where not ``signed``, only increases of conductivity are looked for, if it
-    can be told to."""
+    """Turns frames into images. If not ``signed``, only increases of conductivity are looked for,
+    if the method has that option."""
 
     def show(self, untouched_v: FloatArray, frames_v: FloatArray, signed: bool) -> Shown:
         """Images of ``frames_v`` (k, m) against the mean of ``untouched_v`` (q, m)."""

@@ -50,7 +50,7 @@ def tried(
     evaluation_sets: EvaluationSets,
     facts: dict[str, Any],
 ) -> dict[Levers, dict[str, Any]]:
-    """Every setting of levers that is looked at, with what it gave."""
+    """All settings of levers that were tried, with their results."""
     wanted = list(
         dict.fromkeys([one for kind in KINDS for one in one_by_one(kind)] + together("difference"))
     )

@@ -1,4 +1,4 @@
-"""The measured tanks: their skin, their frames from the files as they were published, and what is
+"""The measured tanks: their skin, their frames from the published files, and the objects that are
 known to have stood in them.
 
 Hauptmann et al., arXiv:1704.01178, doi 10.5281/zenodo.1203914: nine phantoms, truth digitised by
