@@ -500,6 +500,44 @@ TEST(test_frames_begin_and_end_touches)
     CHECK_EQUAL(reported(b, touches), 0);
 }
 
+/* A frame that is solved although its drives are not explained. */
+static void settle_unexplained(bench *b)
+{
+    for (uint32_t n = 0; n <= EITS_FAST_FRAMES; ++n)
+        settle(b, 2);
+    CHECK(b->fast->unexplained_frames > EITS_FAST_FRAMES);
+}
+
+/* Drives have not found three fingers that land at once beside a known one. A frame whose touches
+ * explain all of it shows them at once, and corrects the known one; any other frame does not. */
+TEST(test_one_frame_decides)
+{
+    static const double all[][2] = {{20, 15}, {-30, 5}, {-5, -35}, {0, 40}};
+    const struct {
+        double left;
+        uint32_t diagnostics, touches;
+    } cases[] = {{0.0005, 0, 4},
+                 {0.0005, EITS_DIAGNOSTIC_CROWDED, 4},
+                 {0.0005, EITS_DIAGNOSTIC_OUTLIER, 1},
+                 {0.01, 0, 1}};
+    for (uint32_t n = 0; n < sizeof cases / sizeof cases[0]; ++n) {
+        bench *b = bench_open(EITS_SIGN_INCREASE);
+        eits_fast_touch touches[EITS_FAST_TOUCHES];
+        drives(b, 8);
+        put(b, 0, 20, 11, 1);
+        settle(b, 32);
+        for (uint32_t k = 1; k < 4; ++k)
+            put(b, k, all[k][0], all[k][1], 1);
+        settle_unexplained(b);
+        CHECK_EQUAL(reported(b, touches), 1);
+        b->skin.ctx->info.unexplained = (eits_real)cases[n].left;
+        b->skin.ctx->info.diagnostics = cases[n].diagnostics;
+        find(b, all, 4);
+        CHECK_EQUAL(reported(b, touches), cases[n].touches);
+        CHECK_NEAR(touches[0].y_mm, cases[n].touches == 4 ? 15 : 11, 1);
+    }
+}
+
 /* Drives come while a frame is solved: what is found in it is where touches were then, and says
  * nothing of one that came since. */
 TEST(test_touches_that_move_on)

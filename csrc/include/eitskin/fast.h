@@ -224,8 +224,10 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
 
 /* Take the touches that the whole-frame solver found in the last aligned frame; drives may have
  * come since. A touch ends if the solver misses it in two consecutive frames, and starts if only
- * the solver finds it in two. Rows of electrodes that the context named in the frame are left out
- * of drives until a frame no longer names them. Errors: EITS_E_ARGUMENT. */
+ * the solver finds it in two, or in one frame whose drives were not explained and that its touches
+ * explain. The context must still hold what it said of that frame. Rows of electrodes that the
+ * context named in the frame are left out of drives until a frame no longer names them. Errors:
+ * EITS_E_ARGUMENT. */
 eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t count);
 
 /* Remove from `info`, a copy of the last aligned frame's info, the diagnostics that should not be

@@ -157,6 +157,15 @@
  * smaller: one bad frame ends true ones */
 #define EITS_FAST_LOST_FRAMES 2
 
+/* a solved frame that drives do not explain decides alone where touches are if its touches leave
+ * less than this [of the frame's energy]. larger: a frame in which a finger lands gives false
+ * touches; smaller: touches come a frame later */
+#define EITS_FAST_DECIDES_LEFT R(0.001)
+
+/* a still touch that is further than this from where such a frame has it is put there [mm]. larger:
+ * dragged touches stay; smaller: places of frames cut in */
+#define EITS_FAST_DECIDES_MM R(2.0)
+
 /* standard deviation of the place of a touch that only frames found [mm]. as FAST_BORN_MM */
 #define EITS_FAST_SEED_MM R(3.0)
 

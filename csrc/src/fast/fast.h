@@ -109,6 +109,7 @@ struct eits_fast {
     uint32_t drive_count;
     uint32_t unexplained, newsy; /* a bit for each of the last 32 drives */
     uint32_t unexplained_frames, frame_explained;
+    uint32_t decided;    /* whether the last solved frame alone decided where touches are */
     uint32_t aligned_us; /* time of the last alignment of a frame, and the time between it and the
                             one before */
     eits_real frame_s;

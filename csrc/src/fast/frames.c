@@ -171,6 +171,17 @@ static void mask_named(eits_fast *fast)
     }
 }
 
+/* Whether the solved frame alone decides where touches are: the drives were left unexplained for so
+ * long that the solver was asked, and its touches explain the whole frame. They would not explain a
+ * frame in which a finger landed. */
+static int decides(const eits_fast *fast)
+{
+    const eits_info *info = &fast->ctx->info;
+    return fast->unexplained_frames > EITS_FAST_FRAMES &&
+           info->unexplained < EITS_FAST_DECIDES_LEFT &&
+           (info->diagnostics & ~(uint32_t)EITS_DIAGNOSTIC_CROWDED) == 0;
+}
+
 static int near_any(const eits_real *place, const eits_real (*others)[2], uint32_t count)
 {
     for (uint32_t k = 0; k < count; ++k) {
@@ -227,9 +238,9 @@ static void seed(eits_fast *fast, const eits_touch *found, const eits_real (*at)
         const eits_real state[FAST_SIZE] = {at[n][0], at[n][1], c, 0, 0};
         if (owner[n] != FAST_NONE || !(c > 0) || fast_is_rest(fast, at[n], c))
             continue;
-        /* Two frames on end: in a single one, a touch that landed while it was scanned may stand at
-         * a wrong place. */
-        if (!near_any(state, (const eits_real(*)[2])before, known) ||
+        /* Two frames on end, unless one decides: in a single one, a touch that landed while it was
+         * scanned may stand at a wrong place. */
+        if ((!decides(fast) && !near_any(state, (const eits_real(*)[2])before, known)) ||
             fast->count == EITS_FAST_MAX_TOUCHES || near_known(fast, state)) {
             if (fast->seeds < EITS_FAST_MAX_TOUCHES)
                 eits_copy(fast->seed[fast->seeds++], state, 2);
@@ -269,7 +280,8 @@ static void put(eits_fast *fast, uint32_t k, const eits_real *before, const eits
 
 /* A touch that two frames on end show elsewhere is put there. If drives explain a frame, a touch
  * that moves is theirs; if they do not, it may have gone on between the two frames, and the first
- * of them may still have agreed. */
+ * of them may still have agreed. One frame that decides puts a touch as a still one; where the
+ * frame before decided too, a touch that is elsewhere again moves. */
 static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_real c)
 {
     fast_known *known = &fast->known[k];
@@ -279,14 +291,20 @@ static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_re
     const int may_be_lost = known->moving || fast->unexplained_frames >= EITS_FAST_LOST_FRAMES;
     const int lost = may_be_lost && !fast->frame_explained && before == FAST_AGREED;
     const int again = (before == FAST_ELSEWHERE || lost) && by < fast_square(reach);
+    const eits_real far2 = fast_distance2(place, known->at);
     known->frames_missed = 0;
-    known->last = fast_distance2(place, known->at) < fast_square(EITS_FAST_AGREE_MM)
-                      ? FAST_AGREED
-                      : FAST_ELSEWHERE;
+    known->last = far2 < fast_square(EITS_FAST_AGREE_MM) ? FAST_AGREED : FAST_ELSEWHERE;
     if (known->last == FAST_AGREED)
         known->confirmed = 1;
-    else if (again && !(known->moving && fast->frame_explained) && !fast_is_palm(known->rho2))
-        put(fast, k, known->place, place, c);
+    if (!fast_is_palm(known->rho2)) {
+        const int elsewhere = known->last == FAST_ELSEWHERE;
+        const int goes = elsewhere && fast->decided && (known->moving || before == FAST_ELSEWHERE);
+        const eits_real most = known->moving ? EITS_FAST_AGREE_MM : EITS_FAST_DECIDES_MM;
+        if (decides(fast) && !goes && far2 > fast_square(most))
+            set_by_frame(fast, k, place, c);
+        else if (elsewhere && again && !(known->moving && fast->frame_explained))
+            put(fast, k, known->place, place, c);
+    }
     eits_copy(known->place, place, 2);
     known->place_us = fast->aligned_us;
 }
@@ -326,6 +344,7 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
     /* a frame with rows that are no touch's may show any */
     seed(fast, found, (const eits_real(*)[2])at, owner, fast->wild == 0 ? count : 0);
     fast->wild = 0;
+    fast->decided = (uint32_t)decides(fast);
     return EITS_OK;
 }
 
