@@ -33,7 +33,7 @@ def _row(*cells: Any) -> str:
 
 def _enum(known: dict[str, Table], enum: Table) -> Lines:
     """Number, name, meaning, and the columns for the page, structs with their bytes: a table where
-    the first of them is a text in place of the name, else a list; text where there are none."""
+    the first of them is a text in place of the name, else a list; text if there are none."""
     columns = enum.get("columns", [])
     if not columns:
         yield from ("```text", *_values(enum), "```")

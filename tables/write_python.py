@@ -156,7 +156,7 @@ def _options_module(tables: Tables) -> Lines:
         numbers = ", ".join(f'"{word(row[0])}": {row[1]}' for row in types[kind]["rows"])
         yield f'    "{name}": {{{numbers}}},'
     yield "}"
-    yield from remark("What a model's own defaults say, by the same names.")
+    yield from remark("The own defaults of a model, by the same names.")
     yield from joined("OF_MODEL = ", [f'"{row[0]}"' for row in rows if row[2] == "model"])
 
 
@@ -219,7 +219,9 @@ def _dataclass(struct: Table, bases: str = "") -> Lines:
 def _diagnostics_module(tables: Tables) -> Lines:
     types = types_of(tables["diagnostics"])
     yield from _head(
-        "What the core says of a frame.", "diagnostics", "from dataclasses import dataclass"
+        "Diagnostics and info of a frame, from the core.",
+        "diagnostics",
+        "from dataclasses import dataclass",
     )
     yield from _names(types["eits_diagnostic"], "DIAGNOSTICS")
     yield f"{all_name(types['eits_diagnostic'])} = {_all(types['eits_diagnostic'])}"

@@ -41,7 +41,7 @@ def texts() -> dict[str, str]:
 
 
 def refuse_broken(checked: Checked) -> None:
-    """Refuse a circuit that breaks an electrical rule.
+    """Reject a circuit that breaks an electrical rule.
 
     Raises:
         RulesError: names the first broken rules.

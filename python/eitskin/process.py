@@ -22,5 +22,5 @@ def take_over() -> None:
 
 
 def is_own() -> bool:
-    """Whether ``take_over`` was called."""
+    """Return whether ``take_over`` was called."""
     return _Process.own

@@ -5,10 +5,9 @@
 Mistakes are made from the syntax (mutants.py): of all of them a sample, the same in every run, over
 the core and the firmware. The C tests try them. Beside these, a few picked by hand (mistakes.toml).
 A mutant that compiles to the same object does not count. One that no test notices must be judged in
-survivors.toml. Ends with 1 where less than 95 % of the others are noticed (in a small sample, less
+survivors.toml. Ends with 1 if less than 95 % of the others are noticed (in a small sample, less
 than chance makes of that), where a mistake picked by hand is not, or where a judgement or mistake
-fits no source any more.
-"""
+fits no source any more."""
 
 import argparse
 import hashlib

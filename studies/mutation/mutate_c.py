@@ -124,8 +124,7 @@ def sanitizer() -> str:
 
 
 def run_test(library: Library, test: str, folder: Path, most_cpu_seconds: float) -> str:
-    """How it fails with the libraries in ``folder``, before the sound ones; empty where it
-    passes."""
+    """How it fails with the libraries in ``folder``, before the sound ones; empty if it passes."""
     program = [str(BUILD / TESTS[library.name] / test)]
     if test.startswith("replay_"):
         name = test.removeprefix("replay_")
@@ -161,7 +160,7 @@ class Workshop:
     def compile(
         self, command: Sequence[str], file: str, text: str, flags: Sequence[str] = ()
     ) -> bytes:
-        """The object of a source with this text; empty where the compiler refuses."""
+        """The object of a source with this text; empty if the compiler refuses."""
         changed, made = self.folder / Path(file).name, self.folder / "mutant.o"
         changed.write_text(text)
         words = list(command)
@@ -173,7 +172,7 @@ class Workshop:
         return b"" if done.returncode else made.read_bytes()
 
     def is_same(self, library: Library, mutant: Mutant, source: str) -> bool:
-        """Whether the compiler makes the same of it."""
+        """Return whether the compiler makes the same of it."""
         command = library.commands[mutant.file]
         original, changed = (
             self.compile(command, mutant.file, text) for text in (source, mutant.applied(source))

@@ -92,7 +92,7 @@ typedef enum eits_stop {
     EITS_STOP_OPTIMUM = 6
 } eits_stop;
 
-/* Which image shows a frame. */
+/* The image that shows a frame. */
 typedef enum eits_shown {
     /* the solver's image (eits_get_image): there are no touches, or they do not explain the
      * frame */

@@ -215,7 +215,7 @@ class BoardParts:
         self.cpu.end_slice()
 
     def _keeps_drive(self) -> bool:
-        """Whether the latest of the owner's settings lets current flow without a host."""
+        """Return whether the latest of the owner's settings lets current flow without a host."""
         latest, keeps = -1, False
         for at in range(PAGES, PAGES + PAGES_BYTES, RECORD_BYTES):
             magic, generation, settings = unpack_from("<III", self.memories.flash, at - FLASH)

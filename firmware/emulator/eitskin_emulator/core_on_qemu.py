@@ -135,7 +135,7 @@ def checkout_root() -> Path:
 
 
 def need_tools(*names: str) -> None:
-    """Refuse what cannot be done without programs that are absent.
+    """Reject what cannot be done without programs that are absent.
 
     Raises:
         UsageError: naming them.

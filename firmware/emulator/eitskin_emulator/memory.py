@@ -101,7 +101,7 @@ class Memories:
         return True
 
     def word(self, address: int) -> int:
-        """The word at ``address``; 0 where no memory is."""
+        """The word at ``address``; 0 if no memory is."""
         return int.from_bytes(self.read(address, 4) or b"", "little")
 
     def _map(self, at: int, memory: mmap.mmap, offset: int, size: int, protection: int) -> None:

@@ -29,7 +29,7 @@ class RecordedRows:
 
     @property
     def moves(self) -> bool:
-        """Whether a row depends on when it is read, and not on its frame alone."""
+        """Return whether a row depends on when it is read, and not on its frame alone."""
         return self._rows.moves
 
     def __getitem__(self, frame: int) -> FloatArray:

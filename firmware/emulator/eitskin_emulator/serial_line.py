@@ -48,7 +48,7 @@ class SerialLine:
         self.host_sends: Callable[[], None] = lambda: None
 
     def agrees(self, frame_ticks: int) -> bool:
-        """Whether a side with frames of this length understands the line."""
+        """Return whether a side with frames of this length understands the line."""
         return abs(frame_ticks - self.frame_ticks) <= TOLERANCE * self.frame_ticks
 
     # ---- the host's end ----

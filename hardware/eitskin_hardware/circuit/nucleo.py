@@ -19,9 +19,8 @@ class Wire:
     """One wire: a pin of the processor, where the board has it, what the firmware does with it, and
     its other end.
 
-    ``zio`` is empty where only the morpho connector has the pin; both are empty where the board
-    itself uses it.
-    """
+    ``zio`` is empty if only the morpho connector has the pin; both are empty if the board itself
+    uses it."""
 
     pin: str
     zio: str

@@ -40,7 +40,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Order:
-    """How a part is ordered: ``value`` is empty where the kind alone says it."""
+    """How a part is ordered: ``value`` is empty if the kind alone says it."""
 
     kind: str
     value: str

@@ -212,7 +212,7 @@ def _same(a: Point, b: Point) -> bool:
 
 
 def _on(point: Point, start: Point, end: Point) -> bool:
-    """Whether a point lies on a line that is level or upright."""
+    """Return whether a point lies on a line that is level or upright."""
     low = (min(start[0], end[0]) - NEAR, min(start[1], end[1]) - NEAR)
     high = (max(start[0], end[0]) + NEAR, max(start[1], end[1]) + NEAR)
     return low[0] <= point[0] <= high[0] and low[1] <= point[1] <= high[1]

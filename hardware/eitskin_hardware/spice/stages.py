@@ -65,7 +65,7 @@ class Reading:
 
     @property
     def passes(self) -> bool:
-        """Whether it is as it should be."""
+        """Return whether it is as it should be."""
         return self.least <= self.value <= self.greatest
 
 

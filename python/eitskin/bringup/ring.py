@@ -3,8 +3,7 @@
 With the drive between electrodes 15 and 0, the electrodes have 16 different voltages against
 electrode 0. So a sweep of one multiplexer shows which electrode it really joins at each address. By
 reciprocity the same holds for the multiplexers of the current. Exchanged address lines leave 15 and
-0 where they are.
-"""
+0 if they are."""
 
 from collections.abc import Sequence
 
@@ -24,7 +23,7 @@ def levels_ohm(resistor_ohm: float) -> FloatArray:
 
 
 def sweep_rows(multiplexer: int) -> list[Row | None]:
-    """The row of each address of a multiplexer; None where both of its pair would be the same."""
+    """The row of each address of a multiplexer; None if both of its pair would be the same."""
     rows: list[Row | None] = []
     for k in range(ELECTRODES):
         row = [15, 0, 15, 0]

@@ -157,7 +157,7 @@ def generator(bench: Bench) -> StageReport:
 
 
 def source(bench: Bench) -> StageReport:
-    """Whether the current depends on the load, and, where somebody measures it, its size."""
+    """Return whether the current depends on the load, and, where somebody measures it, its size."""
     bench.connect("chain")
     here, behind = bench.probe.level(FIRST), bench.probe.level(BEHIND)
     ratio = behind.size_v / max(here.size_v, 1e-9)

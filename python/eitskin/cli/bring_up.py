@@ -20,7 +20,7 @@ class Person:
         self._there = sys.stdin.isatty() and sys.stderr.isatty()
 
     def number(self, question: str) -> float | None:
-        """A number, or None where none is given."""
+        """A number, or None if none is given."""
         text = self._ask(f"{question} (empty: not measured): ").strip()
         try:
             return plain_number(text) if text else None
@@ -29,7 +29,7 @@ class Person:
             return None
 
     def done(self, what: str) -> bool:
-        """Whether it was done."""
+        """Return whether it was done."""
         return self._there and self._ask(f"{what}, then press Enter (s: skip): ").strip() != "s"
 
     def connect(self, what: str) -> None:

@@ -1,4 +1,6 @@
-"""What the core says of a frame. Written by tables/make_tables.py from tables/diagnostics.toml."""
+"""Diagnostics and info of a frame, from the core. Written by tables/make_tables.py from
+tables/diagnostics.toml.
+"""
 
 from dataclasses import dataclass
 
@@ -18,7 +20,7 @@ DIAGNOSTICS = (
 ALL_DIAGNOSTICS = 511
 # eits_stop: Why the solver stopped.
 STOPS = ("iterations", "gap", "below-threshold", "zero", "diverged", "macs", "optimum")
-# eits_shown: Which image shows a frame.
+# eits_shown: The image that shows a frame.
 SHOWN = ("solver", "touches")
 
 

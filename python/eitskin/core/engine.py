@@ -385,5 +385,5 @@ def touch_of(t: Any) -> Touch:
 
 
 def c_touches(touches: Sequence[Touch]) -> list[dict[str, Any]]:
-    """Return ``touches`` as eits_touch takes them: 0 where something is not known."""
+    """Return ``touches`` as eits_touch takes them: 0 if something is not known."""
     return [{name: getattr(one, name) or 0 for name in _TOUCH_NAMES} for one in touches]

@@ -92,8 +92,8 @@ class FastCore:
 
     @one_at_a_time
     def drive(self, number: int, volts: npt.ArrayLike, time_s: float) -> list[FastTouch]:
-        """Process the rows ``self.rows[number]`` (r,) in V, nan where there is no value, measured
-        at about ``time_s``; return the touches.
+        """Process the rows ``self.rows[number]`` (r,) in V, nan if there is no value, measured at
+        about ``time_s``; return the touches.
 
         Raises:
             FrameError: the number of rows is wrong, there is no such drive, or no reference.

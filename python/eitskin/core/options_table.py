@@ -136,7 +136,7 @@ CHOICES: dict[str, dict[str, int]] = {
     "sign": {"increase": 0, "decrease": 1, "both": 2},
     "solver": {"fista": 0, "working-set": 1, "active-set": 3},
 }
-# What a model's own defaults say, by the same names.
+# The own defaults of a model, by the same names.
 OF_MODEL = (
     "iterations",
     "solver",

@@ -197,8 +197,7 @@ class Reconstruction:
         info: cost, end and diagnostics.
         model: None where it is not known.
         touch_image: (n,) S/m, the touches as discs and ellipses of one height
-            (``eits_draw_touches``); None where there are none, or where they do not explain the
-            frame.
+            (``eits_draw_touches``); None if there are none, or where they do not explain the frame.
     """
 
     solver_image: npt.NDArray[np.floating[Any]]

@@ -28,7 +28,7 @@ DRIVE_TOUCHES_BYTES = DriveTouchesHead.LAYOUT.size + DriveTouch.LAYOUT.size
 
 
 def frame_bytes(info: BoardInfo, what: Stream) -> int:
-    """Bytes on the wire of one frame, about."""
+    """Return the approximate number of bytes of one frame on the wire."""
     kinds = {
         Stream.RAW: RAW_BYTES + ROW_BYTES * info.n_rows,
         Stream.IMAGE: SOLVED_BYTES + PIXEL_BYTES * info.n_pixels,
@@ -41,8 +41,7 @@ def frame_bytes(info: BoardInfo, what: Stream) -> int:
 
 
 def least_every(info: BoardInfo, what: Stream, baud: int) -> int:
-    """The least N with which every N-th frame of ``what`` fits a line of ``baud``; 1 where all
-    do."""
+    """The least N with which every N-th frame of ``what`` fits a line of ``baud``; 1 if all do."""
     if not info.has_model:
         return 1
     line_us = 1e6 * frame_bytes(info, what) * BITS_A_BYTE / (USED * baud)

@@ -27,7 +27,7 @@ def host_major() -> int:
 
 
 def check_board(info: BoardInfo, name: str) -> None:
-    """Refuse a board whose firmware is of another major version."""
+    """Reject a board whose firmware is of another major version."""
     if info.firmware[0] != host_major():
         newer = info.firmware[0] > host_major()
         raise DeviceError(
@@ -99,7 +99,7 @@ def scanned_pattern(info: BoardInfo) -> str:
 
 
 def check_fits(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
-    """Refuse a model that the board cannot hold, or whose electrodes it does not have."""
+    """Reject a model that the board cannot hold, or whose electrodes it does not have."""
     if model.protocol.n_electrodes > info.electrodes:
         raise DeviceError(
             f"{name}: the model's protocol needs {model.protocol.n_electrodes} electrodes and the"
@@ -110,7 +110,7 @@ def check_fits(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
 
 
 def check_model(info: BoardInfo, model: Model, blob: bytes, name: str) -> None:
-    """Refuse to read a board's frames with another model than it scans and solves with."""
+    """Reject to read a board's frames with another model than it scans and solves with."""
     if not info.has_model:
         raise DeviceError(
             f"{name}: the board has no model; upload one with  eitskin model upload MODEL.eitm"

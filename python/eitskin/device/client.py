@@ -60,8 +60,8 @@ def check_tare_frames(frames: int) -> int:
 
 
 class Device(CommandExchange):
-    """All commands and questions that a board takes; ``open_device`` makes one from a URL. Raises
-    as ``CommandExchange``. ``pacer`` holds frames back as ``?speed=`` of the URL says."""
+    """All commands and requests that a board takes; ``open_device`` makes one from a URL. Raises as
+    ``CommandExchange``. ``pacer`` holds frames back as ``?speed=`` of the URL says."""
 
     pacer: Pacer | None = None
     can_undo_tare = False  # as far as this program knows
@@ -310,11 +310,11 @@ class Device(CommandExchange):
         return answer
 
     def clear_faults(self) -> None:
-        """Forget the faults that the board has raised; those that persist rise again."""
+        """Clear the faults that the board has raised; those that persist are raised again."""
         self.command(commands.ClearFaults(), ANSWER_S)
 
     def reset(self) -> BoardInfo:
-        """Restart the board and wait until it answers; its reference is gone."""
+        """Restart the board and wait until it answers; it then has no reference."""
         with self.asking:
             self.command(commands.Reset(), ANSWER_S)
             self.can_undo_tare = False

@@ -94,7 +94,7 @@ class CommandExchange:
 
     @property
     def replays(self) -> bool:
-        """It is a recording: nothing can be asked of it."""
+        """Return whether it is a recording, which answers no requests."""
         return self.transport.capabilities.replays
 
     @property
@@ -104,7 +104,7 @@ class CommandExchange:
 
     def close(self) -> None:
         """Tell the board to stop its current, and close the port. May be called twice, and from any
-        thread. Takes no longer than a moment, whatever the port does."""
+        thread. It takes only a moment, even if the port does not respond."""
         if self.link.connected and not self.replays and not self.link.away:
             with suppress(EitskinError):
                 self.bounded(WORD_S, self._say_goodbye)
@@ -115,8 +115,9 @@ class CommandExchange:
         self.link.send(PacketType.KEEPALIVE, Keepalive(0).payload(0))
 
     def bounded(self, limit_s: float, action: Callable[[], T]) -> T | None:
-        """``action``, which talks to the board, or None if that takes longer than ``limit_s``. A
-        board with a clock of its own is a part of this program and answers; there is no limit."""
+        """Return the result of ``action``, which talks to the board, or None if it takes longer
+        than ``limit_s``. A board with a clock of its own is a part of this program and answers;
+        there is no limit."""
         if self.transport.capabilities.own_clock:
             return action()
         return within(limit_s, action)
@@ -170,7 +171,7 @@ class CommandExchange:
         return found
 
     def command(self, command: Command, timeout_s: float) -> Reply:
-        """One command that the board must take.
+        """Send one command, which the board must accept.
 
         Raises:
             DeviceError: no answer, or the board refuses.
@@ -180,7 +181,7 @@ class CommandExchange:
         return answer
 
     def send_command(self, command: Command, timeout_s: float) -> Reply:
-        """One command and the reply to it, whatever its status.
+        """Send one command, and return the reply, whatever its status is.
 
         Raises:
             DeviceError: no answer.
@@ -190,7 +191,7 @@ class CommandExchange:
         return answer
 
     def ask(self, command: Command, timeout_s: float, *, refuse: bool = True) -> Answer:
-        """One command and the answer to it: a reply, or the packet that was asked for.
+        """Send one command, and return the answer: a reply, or the requested packet.
 
         Raises:
             DeviceError: no answer, or, with ``refuse``, the board refuses.
@@ -233,7 +234,7 @@ class CommandExchange:
         raise DeviceError(no_answer(self.link, before, what, TRIES * timeout_s))
 
     def _fits(self, answer: Answer, command: Command) -> bool:
-        """Whether this is the answer to ``command``, which was sent last."""
+        """Return whether this is the answer to ``command``, which was sent last."""
         if answer.request != self._request:
             return False
         if isinstance(answer, Reply):

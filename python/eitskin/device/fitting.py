@@ -1,4 +1,4 @@
-"""Whether source and amplifier of a board serve its skin, by a raw frame of it, and which part to
+"""Check by a raw frame that source and amplifier of a board suit its skin, and say which part to
 change if they do not.
 
 The board has one source and one gain at a time: two resistors set them (docs/guide/hardware.md),
@@ -23,8 +23,8 @@ LEAST_SHARE = 0.02  # of the converter's range, in the greatest row: about 40 co
 
 
 def unserved(info: BoardInfo, raw: RawFrame) -> str | None:
-    """Return what does not fit and which value to change; None where the parts serve the skin, or
-    the board does not know them."""
+    """Return what does not fit and which value to change; None if the parts serve the skin, or the
+    board does not know them."""
     if not info.gain_ppm or not info.source_ua:
         return None
     saturated = sum(bool(one & Quality.SATURATED) for one in raw.quality)

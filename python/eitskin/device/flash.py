@@ -125,7 +125,7 @@ def _hex_line(address: int, kind: int, content: bytes) -> str:
 
 
 def check_image(path: Path, image: bytes) -> None:
-    """Refuse what cannot be this board's firmware."""
+    """Reject a file that cannot be this board's firmware."""
     if image[:4] == b"\x7fELF":
         raise DeviceError(f"{path}: this is an .elf; give the .bin beside it")
     if len(image) > FIRMWARE_ROOM:
@@ -143,8 +143,8 @@ def check_image(path: Path, image: bytes) -> None:
 
 
 def run_flash(plan: FlashPlan, echo: Callable[[str], None] | None = None) -> None:
-    """Run the plan; ``echo`` gets each command before it runs. The tool's own output goes where it
-    likes."""
+    """Run the plan; ``echo`` gets each command before it runs. The tool's own output is not
+    redirected."""
     for command, line in zip(plan.commands, plan.lines(), strict=True):
         if echo is not None:
             echo(line)

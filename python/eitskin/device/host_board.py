@@ -111,7 +111,7 @@ class HostBoard:
     @property
     @one_at_a_time
     def wanted(self) -> bool:
-        """Whether a stream or a tare waits for frames."""
+        """Return whether a stream or a tare waits for frames."""
         return bool(self._lib.sim_wants_frame(self._sim))
 
     @one_at_a_time
@@ -144,7 +144,7 @@ class GivenBoard(HostBoard):
     @property
     @one_at_a_time
     def tares(self) -> bool:
-        """Whether a tare waits for frames."""
+        """Return whether a tare waits for frames."""
         return bool(self._lib.sim_tares(self._sim))
 
     @one_at_a_time

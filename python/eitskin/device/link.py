@@ -114,15 +114,15 @@ class Link(ABC):
         return False
 
     def await_port(self, timeout_s: float) -> None:  # noqa: B027 -- most ports are never away
-        """Wait while the port is away, ``timeout_s`` at most. Raises as ``next``."""
+        """Wait while the port is not available, at most ``timeout_s``. Raises as ``next``."""
 
     @property
     def keeps(self) -> bool:
-        """Something waits to be fetched."""
+        """Return whether something waits to be fetched."""
         return bool(self._queue) or self._dropped > 0
 
     def drop_frames(self) -> None:
-        """Forget the frames of a stream that was left; faults and events stay."""
+        """Drop the frames of a stream that was left; faults and events stay."""
         with self._changed:
             self._queue = deque(one for one in self._queue if isinstance(one, Fault | LinkEvent))
 
@@ -181,7 +181,7 @@ class Link(ABC):
         self._dropped += 1
 
     def _take_events(self) -> None:
-        """Queue what happened to the transport itself, counted."""
+        """Queue the events of the transport itself, and count them."""
         for event in self.transport.take_events():
             if event.kind == "skipped":
                 self.counters.lines_skipped += event.missing
@@ -267,8 +267,8 @@ class PumpedLink(Link):
                 rest_s -= PACKET_S * count
 
     def _pump(self, timeout_s: float, *, bounded: bool) -> int | None:
-        """Queue one packet, after reading where none is left; returns 1, 0 where a read completed
-        none, None where no byte came."""
+        """Queue one packet; read first if none is left. Returns 1, or 0 if a read completed no
+        packet, or None if no byte came."""
         if not self._decoded:
             data = self._read(timeout_s)
             self._take_events()
@@ -322,8 +322,7 @@ class PumpedLink(Link):
 
 @dataclass(frozen=True)
 class Reconnect:
-    """How often the link tries to find a board that was unplugged: ``tries`` times, each
-    ``every_s`` after the one before."""
+    """The attempts to find a board that was unplugged: ``tries`` of them, one every ``every_s``."""
 
     tries: int = 240
     every_s: float = 0.5

@@ -72,7 +72,7 @@ def open_device(
 
 
 def _check_given(device: Device, url: str, blob: bytes) -> None:
-    """Refuse a model that is not the board's, or that the board cannot use."""
+    """Reject a model that is not the board's, or that the board cannot use."""
     from eitskin.model.eitm import decode_model
 
     model, name = decode_model(blob, "the model"), device.transport.name
@@ -89,7 +89,7 @@ def _check_given(device: Device, url: str, blob: bytes) -> None:
 
 
 def _check_rate(device: Device) -> None:
-    """Refuse a scene whose frames come faster than the board can scan them."""
+    """Reject a scene whose frames come faster than the board can scan them."""
     scene = device.transport.capabilities.scene
     frame_us = device.board.frame_us
     if scene is None or scene.rate_hz is None or not frame_us:

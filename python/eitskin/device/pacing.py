@@ -10,7 +10,7 @@ class WallClock:
     """The clock of this computer, from which a pacer has its time."""
 
     def now_s(self) -> float:
-        """Seconds from any beginning."""
+        """Return seconds since an arbitrary beginning."""
         return time.monotonic()
 
     def wait(self, changed: threading.Condition, timeout_s: float | None) -> None:
@@ -19,8 +19,8 @@ class WallClock:
 
 
 class Pacer:
-    """Holds each frame until it is due; may be paused, stepped and set to another speed from any
-    thread. What comes late is given on at once, and far behind time starts again from there."""
+    """Holds each frame until it is due; any thread may pause it, step it, or set another speed. A
+    late frame is passed on at once; far behind schedule, the schedule starts again from there."""
 
     def __init__(self, speed: float = 0.0, clock: WallClock | None = None) -> None:
         self._speed, self._clock = speed, clock or WallClock()
@@ -30,7 +30,7 @@ class Pacer:
 
     @property
     def speed(self) -> float:
-        """0: as fast as it can."""
+        """The speed; 0: as fast as possible."""
         return self._speed
 
     @property
@@ -66,7 +66,7 @@ class Pacer:
         return rest_s
 
     def wake(self) -> None:
-        """Let the frame that is held go, or the next one."""
+        """Release the frame that is held, or the next one."""
         self._change(woken=True)
 
     def pause(self) -> None:
@@ -77,7 +77,7 @@ class Pacer:
         self._change(paused=False)
 
     def step(self) -> None:
-        """Pause, and let one frame go."""
+        """Pause, and release one frame."""
         self._change(paused=True, steps=1)
 
     def jump(self) -> None:
@@ -88,7 +88,7 @@ class Pacer:
             self._changed.notify_all()
 
     def set_speed(self, speed: float) -> None:
-        """From the next frame on."""
+        """Set the speed from the next frame on."""
         self._change(speed=speed)
 
     def _change(
@@ -111,7 +111,7 @@ class Pacer:
 
 
 class Slowness:
-    """Says once how much slower than real time frames are made, after ``AFTER_S`` of them."""
+    """Reports once, after ``AFTER_S``, how much slower than real time frames are made."""
 
     AFTER_S = 0.5
 

@@ -1,4 +1,4 @@
-"""Serial ports: which there are, which is a board's, and a transport over one."""
+"""Serial ports: a list of them, the recognition of boards, and a transport over one."""
 
 import contextlib
 import errno
@@ -25,8 +25,7 @@ ALLOW = (
 
 @dataclass(frozen=True)
 class Port:
-    """A serial port. ``vendor`` and ``product`` are its USB numbers, None where it is not on
-    USB."""
+    """A serial port. ``vendor`` and ``product`` are its USB numbers, None if it is not on USB."""
 
     path: str
     description: str = ""
@@ -36,7 +35,7 @@ class Port:
 
     @property
     def is_board(self) -> bool:
-        """Whether it is an ST-LINK's, as on every NUCLEO."""
+        """Return whether it is an ST-LINK's, as on every NUCLEO."""
         return self.vendor == ST_VENDOR and self.product in ST_LINKS
 
 

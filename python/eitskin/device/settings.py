@@ -53,6 +53,6 @@ class SolverSettings(_Settings):
 
 
 def apply_scan(device: Device, scan: ScanSettings) -> None:
-    """Change the scan where something is named; the board forgets its reference then."""
+    """Change the scan if a setting is given; the board then discards its reference."""
     if scan.named:
         device.scan(**scan.named)

@@ -47,7 +47,7 @@ class SimBoard(HostBoard):
     @property
     @one_at_a_time
     def ended(self) -> bool:
-        """Whether the scene is over when the next scan begins."""
+        """Return whether the scene is over when the next scan begins."""
         return bool(self._lib.sim_scene_over(self._sim))
 
     @one_at_a_time
@@ -57,7 +57,7 @@ class SimBoard(HostBoard):
 
     @one_at_a_time
     def scan_one(self) -> bool:
-        """Scan one frame; False where nobody wants one.
+        """Scan one frame; False if nobody wants one.
 
         Raises:
             EitskinError: the scene cannot be simulated.
@@ -73,7 +73,7 @@ class SimBoard(HostBoard):
         return True
 
     def _show_skin(self) -> None:
-        """Put the scene for the model in use before the board, where it is another than before."""
+        """Put the scene for the model in use before the board, if the model has changed."""
         model = self.new_model()
         if model is None:
             return

@@ -36,7 +36,7 @@ PERIODS = 16  # frame periods that the reported rate is the mean of
 
 @dataclass(frozen=True, eq=False)
 class GivenFrame:
-    """A frame: ``voltage_v`` (m,), real or complex, in the model's rows, NaN where a row cannot be
+    """A frame: ``voltage_v`` (m,), real or complex, in the model's rows, NaN if a row cannot be
     used; ``time_s`` by the instrument's clock, where it sends one; ``came_s``: when it came, by
     ``time.monotonic``, where that is not now."""
 
@@ -159,7 +159,7 @@ class SourceTransport(Transport):
         return self._output()
 
     def begin(self) -> None:
-        """Pass on the frames that have come already: the board then knows how often they come."""
+        """Pass on the frames that have come already, so that the board knows their period."""
         if not self.source.synchronous and not self.source.keeps:
             self._give(self.source.read(0.0))
 

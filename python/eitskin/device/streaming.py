@@ -34,15 +34,15 @@ class PacketStream(Protocol):
     over: bool
 
     def next(self, tick_s: float | None) -> Streamed | None:
-        """The next packet or event. None where nothing came for a while, for ``tick_s`` at most
-        (None: as long as a silence may last), or the stream is over.
+        """The next packet or event. None if nothing came for a while, for ``tick_s`` at most (None:
+        as long as a silence may last), or the stream is over.
 
         Raises:
             DeviceError: the board refuses (no model, not tared), is gone, or has gone silent.
         """
 
     def stop(self, limit_s: float = STOP_S) -> bool:
-        """Tell the board to stop, and let others read; False where it does not answer within
+        """Tell the board to stop, and let others read; False if it does not answer within
         ``limit_s``, which is not an error. May be called twice."""
 
 
@@ -63,7 +63,7 @@ class _Progress:
         self._came = {kind: 0 for kind in Stream if kind & what & ~Stream.DRIVE_TOUCHES}
 
     def take(self, item: Streamed) -> bool:
-        """Count ``item``; False where it is a frame's of a kind that was not asked for."""
+        """Count ``item``; False if it is a frame's of a kind that was not asked for."""
         kind = _KIND.get(type(item))
         if kind is None:
             return True
@@ -76,7 +76,7 @@ class _Progress:
 
     @property
     def complete(self) -> bool:
-        """Every kind came for every frame that was wanted."""
+        """Return whether every kind has come for every requested frame."""
         return bool(self.wanted) and min(self._came.values(), default=0) >= self.wanted
 
     @property
@@ -178,8 +178,8 @@ class BoardPackets:
         progress.restarts = device.counters.restarts
 
     def _resume(self) -> None:
-        """Go on after the board was away: only if it is the same, with the same model and, for
-        images, still with its reference."""
+        """Continue after the board was unplugged, but only if it is the same board, with the same
+        model and, for images, still with its reference."""
         device, what = self._device, self._progress.what
         before = device.board
         now = device.info()

@@ -91,7 +91,7 @@ class TextSource(Source):
         return found
 
     def await_frames(self, count: int, wait_s: float) -> None:
-        """Wait until ``count`` frames have come; they are given on later."""
+        """Wait until ``count`` frames have come; they are passed on later."""
         end = time.monotonic() + wait_s
         came = 0
         while len(self._parsed) < count and not self._drained:

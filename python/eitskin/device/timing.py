@@ -13,15 +13,15 @@ MIN_SPEED, MAX_SPEED = 1e-3, 1000.0
 
 @dataclass(frozen=True)
 class Timing:
-    """How fast frames are given on: ``speed`` 1 is as they were scanned, 0 as fast as they can be
-    made, None is not named; ``loop``: from the beginning again at the end."""
+    """The timing of frames: with ``speed`` 1 they come as they were scanned, with 0 as fast as they
+    can be made; None: not given. With ``loop`` they begin again at the end."""
 
     speed: float | None = None
     loop: bool = False
 
 
 def split_name(url: str) -> tuple[str, str | None]:
-    """A device's URL without ``name=NAME`` after '?', and that name; None where it has none.
+    """A device's URL without ``name=NAME`` after '?', and that name; None if it has none.
 
     Raises:
         UsageError: the name cannot be used.
@@ -38,7 +38,7 @@ def split_name(url: str) -> tuple[str, str | None]:
 
 
 def is_name(text: str) -> bool:
-    """Whether ``text`` can name a board, skin or source."""
+    """Return whether ``text`` can name a board, skin or source."""
     return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", text) is not None
 
 

@@ -268,7 +268,7 @@ class LineParser:
 
 
 def has_number(row: Row) -> bool:
-    """Whether a cell of ``row`` is a number."""
+    """Return whether a cell of ``row`` is a number."""
     return any(parse_cell(cell) is not None for cell in row.cells)
 
 

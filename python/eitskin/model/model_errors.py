@@ -114,9 +114,8 @@ class ModelErrors:
     Both are float32, symmetric and positive semidefinite. ``rms_error`` and ``rms_shape_error`` are
     sqrt(mean |e|^2) for random skins and for shaped touches over all rows. ``row_gains`` tells that
     each row is to be scaled to the model by the tare. ``places`` states what the tare reveals about
-    places; None means unknown. ``rows`` is what the joint fit of touches needs; None where the
-    model has no fields for it.
-    """
+    places; None means unknown. ``rows`` is what the joint fit of touches needs; None if the model
+    has no fields for it."""
 
     error: Float32s
     drift: Float32s
@@ -239,7 +238,7 @@ def _other_size(where: str, name: str) -> str:
 
 
 def is_covariance(matrix: Float32s) -> bool:
-    """Whether ``matrix`` (r, r) is positive semidefinite to rounding, in units in which each
+    """Return whether ``matrix`` (r, r) is positive semidefinite to rounding, in units in which each
     diagonal element is 1, as the core decides."""
     a = matrix.astype(np.float64)
     own = np.diag(a)

@@ -209,7 +209,7 @@ class RandomSkins:
         return np.asarray(gain * (v - v0))
 
     def row_ratio(self, v0: FloatArray) -> FloatArray:
-        """Return gain v0 / v_ref (k,) within the bounds of row gains, 1 where a row has next to no
+        """Return gain v0 / v_ref (k,) within the bounds of row gains, 1 if a row has next to no
         reference or another sign. Its logarithm is y."""
         v_ref = self.v_ref
         gain = float(np.linalg.norm(v_ref) / np.linalg.norm(v0))

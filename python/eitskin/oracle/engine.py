@@ -347,7 +347,7 @@ class OracleEngine:
 
     @property
     def _interact(self) -> bool:
-        """Whether what touches do to each other is taken out of the data."""
+        """Return whether what touches do to each other is taken out of the data."""
         model, wanted = self.model, bool(self.options.touch_fit & INTERACTION)
         return model.fields is not None and model.data_kind == "difference" and wanted
 

@@ -161,7 +161,7 @@ def outliers(model: Model, folded: Folded, ref: Reference, found: Found) -> Bool
 
 def predicted(model: Model, folded: Folded, which: IntArray) -> FloatArray:
     """Predict the folds in ``which`` from the other folds, by ridge regression on the model's
-    singular vectors; NaN where the others do not determine them."""
+    singular vectors; NaN if the others do not determine them."""
     nothing = np.full(len(which), np.nan)
     if model.row_form is None or not folded.known.all():
         return nothing
@@ -222,8 +222,8 @@ def noise_energy(model: Model, folded: Folded, ref: Reference) -> float:
 def mismatch(
     model: Model, folded: Folded, ref: Reference, drift: FloatArray | None, found: Found
 ) -> bool:
-    """Whether more of d lies outside the model's range than noise explains; sets the fraction of
-    |d| that does."""
+    """Return whether more of d lies outside the model's range than noise explains; sets the
+    fraction of |d| that does."""
     folds, rank = len(folded.d), model.rank
     if model.row_form is None or not folded.known.all() or rank >= folds or not ref.noise_v > 0:
         return False
@@ -267,7 +267,7 @@ def unpaired(model: Model, folded: Folded, found: Found) -> BoolArray:
 
 
 def scaled(frame: FloatArray, ref: Reference, unusable: BoolArray, found: Found) -> None:
-    """Whether the rows in use have another size than the reference, all together."""
+    """Return whether the rows in use have another size than the reference, all together."""
     v0 = ref.v0[~unusable]
     along = float((frame[~unusable] * np.where(v0 < 0, -1, 1)).sum())
     size, most = float(np.abs(v0).sum()), limits.STALE_SCALE
@@ -279,7 +279,8 @@ def scaled(frame: FloatArray, ref: Reference, unusable: BoolArray, found: Found)
 
 
 def stale(correlation: FloatArray, options: Options, lambda_noise: float) -> bool:
-    """Whether S'y goes the way that touches cannot, more than the other way and than noise."""
+    """Return whether S'y goes the way that touches cannot, more than the other way and than
+    noise."""
     if options.sign == "both" or not lambda_noise > 0:
         return False
     other = "decrease" if options.sign == "increase" else "increase"
@@ -295,8 +296,8 @@ def crowded(
     unexplained: float,
     clearness: float,
 ) -> bool:
-    """Whether there are more touches than can be separated, by a linear score; ``clearness``:
-    lambda_max over lambda_noise."""
+    """Return whether there are more touches than can be separated, by a linear score;
+    ``clearness``: lambda_max over lambda_noise."""
     if not touches or clearness < limits.CROWD_FAINT:
         return False
     apart = [

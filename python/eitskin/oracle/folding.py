@@ -12,10 +12,10 @@ from eitskin.model.model import Model
 @dataclass(frozen=True, eq=False)
 class Reference:
     """The untouched skin: ``v0`` (m,) V, NaN without one; ``rms_v`` of the folded v0; ``gain``,
-    model volts per measured volt; ``row_gain`` (m,); ``noise_v`` and ``lambda_noise``, 0 where they
+    model volts per measured volt; ``row_gain`` (m,); ``noise_v`` and ``lambda_noise``, 0 if they
     were not learned; ``log_gain`` (k,), the logarithm of v_ref / v0, NaN without v0; ``far``: the
-    instrument differs from the model, not the skin; ``drift_v0``: v0 as the drift's direction
-    has it."""
+    instrument differs from the model, not the skin; ``drift_v0``: v0 as the drift's direction has
+    it."""
 
     v0: FloatArray
     rms_v: float
@@ -31,8 +31,8 @@ class Reference:
 
 @dataclass(frozen=True, eq=False)
 class Folded:
-    """Folded data ``d`` (k,), 0 without a row; what its rows differ by (k,), 0 where one is in use
-    or one is a copy; and which rows are in use (k,)."""
+    """Folded data ``d`` (k,), 0 without a row; what its rows differ by (k,), 0 if one is in use or
+    one is a copy; and which rows are in use (k,)."""
 
     d: FloatArray
     apart: FloatArray

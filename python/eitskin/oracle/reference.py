@@ -43,9 +43,9 @@ def fitted(model: Model, v0: FloatArray, masked: BoolArray, row_gains: bool) -> 
 
 
 def with_row_gains(model: Model, ref: Reference, wanted: bool) -> Reference:
-    """Row gains: each row's v_ref / (gain v0), within a factor of MAX_ROW_GAIN; 1 where signs
-    differ. They stay 1 where the reference is further from the model, or from its own reciprocals,
-    than a skin makes it."""
+    """Row gains: each row's v_ref / (gain v0), within a factor of MAX_ROW_GAIN; 1 if signs differ.
+    They stay 1 if the reference is further from the model, or from its own reciprocals, than a skin
+    makes it."""
     fold, expected = model.fold, np.full(len(ref.v0), np.nan)
     paired = fold.second >= 0
     expected[fold.first] = model.v_ref_v
@@ -77,7 +77,7 @@ def with_row_gains(model: Model, ref: Reference, wanted: bool) -> Reference:
 def odd_folds(model: Model, newer: FloatArray, older: FloatArray, used: BoolArray) -> BoolArray:
     """Folds (k,) that changed oddly from ``older`` to ``newer`` (m,): their rows changed
     differently, or where rows are copies they changed at all, by more than the others, than a part
-    of the greatest voltage and than a part of their own. None where they are too many for outliers.
+    of the greatest voltage and than a part of their own. None if they are too many for outliers.
     """
     fold = model.fold
     change, size = np.where(used, newer - older, 0.0), np.where(used, np.abs(older), 0.0)

@@ -220,8 +220,8 @@ class PageServer:
         return Starlette(routes=routes)
 
     def _host_is_ours(self, host: str) -> bool:
-        """Whether a Host header names this server: by its name as given, this machine's, or an
-        address; any other name may be a trick of another site (DNS rebinding)."""
+        """Return whether a Host header names this server: by its name as given, this machine's, or
+        an address; any other name may be a trick of another site (DNS rebinding)."""
         if not re.fullmatch(r"[A-Za-z0-9.\-]+(:\d{1,5})?|\[[0-9A-Fa-f:.]+\](:\d{1,5})?", host):
             return False
         try:
@@ -237,7 +237,7 @@ class PageServer:
         return self._remote or address.is_loopback
 
     def _from_here(self, headers: Any) -> bool:
-        """Whether Host is ours, and Origin, where a browser sends one, the same."""
+        """Return whether Host is ours, and Origin, where a browser sends one, the same."""
         host, origin = headers.get("host", ""), headers.get("origin")
         if not self._host_is_ours(host):
             return False

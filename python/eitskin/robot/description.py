@@ -56,7 +56,8 @@ class Robot:
 
 
 def is_robot(url: str) -> bool:
-    """Whether ``url`` names a robot: robot:FILE, or the path of a TOML file or URDF alone."""
+    """Return whether ``url`` names a robot: robot:FILE, or the path of a TOML file or URDF
+    alone."""
     if url.startswith(SCHEME):
         return True
     bare = split_name(url)[0].rpartition("?")[0] or url

@@ -19,7 +19,7 @@ def skin_file(folder: Path, name: str, part: int = 1) -> Path:
 
 
 def check_folder(folder: Path, overwrite: bool) -> None:
-    """Refuse a folder in which a robot cannot be recorded.
+    """Reject a folder in which a robot cannot be recorded.
 
     Raises:
         FileError: it is a file, its parent does not exist, or it holds something already.

@@ -33,7 +33,7 @@ class Matching:
 
     @property
     def exact(self) -> bool:
-        """Whether every true touch was found within the gate, and nothing else."""
+        """Return whether every true touch was found within the gate, and nothing else."""
         return self.misses == 0 and self.false_touches == 0
 
 

@@ -1,5 +1,5 @@
-"""Packets of a stream put together: what of a frame came in several packets becomes one ``Frame``,
-timed by a clock that does not wrap."""
+"""Assemble the packets of a stream: the packets of one frame become one ``Frame``, with times by a
+clock that does not wrap."""
 
 from collections.abc import Iterable, Iterator
 
@@ -65,7 +65,7 @@ def assembled(items: Iterable[Streamed], wanted: Stream) -> Iterator[Message]:
 def read_frames(
     device: Device, what: Stream, *, every: int = 1, frames: int = 0
 ) -> Iterator[Message]:
-    """``Device.stream`` as messages, for whoever needs no more of a session."""
+    """Yield the messages of ``Device.stream``, for callers that need nothing else of a session."""
     return assembled(device.stream(what, every=every, frames=frames), what)
 
 

@@ -97,7 +97,7 @@ class DriveReport:
 
     @cached_property
     def placed(self) -> tuple[PlacedTouch, ...] | None:
-        """The touches in the frame of the skin's link; None where that is not known."""
+        """The touches in the frame of the skin's link; None if that is not known."""
         return _placed(self.placement, self.touches)
 
     def message(self) -> dict[str, Any]:
@@ -126,7 +126,7 @@ class Frame:
         board_us: the same by the board's own clock, which wraps.
         raw: the voltages as the board sent them, each with its quality; None where they were not
             asked for.
-        solver_image: (n,) S/m on the model's pixels, as the board's solver left it; None where it
+        solver_image: (n,) S/m on the model's pixels, as the board's solver left it; None if it
             was not asked for.
         touches: strongest first; none where touches were not asked for (``has_touches``).
         info: what the solver reports; None where nothing was solved.
@@ -138,7 +138,7 @@ class Frame:
         arrived_ns: the same by ``time.monotonic_ns``.
         true: the touches that were there, where an observer of a scene knows them.
         errors_mm: how far off the found touches (without them, the image's places) are, by their
-            number; false ones are missing. None where the truth is not known.
+            number; false ones are missing. None if the truth is not known.
         notices: what was noticed since the frame before.
         placement: where the skin is on its robot's link; None: not known.
     """
@@ -173,17 +173,17 @@ class Frame:
 
     @property
     def voltage_v(self) -> npt.NDArray[np.float32] | None:
-        """(m,) V, NaN for rows that cannot be used; None where it was not asked for."""
+        """(m,) V, NaN for rows that cannot be used; None if it was not asked for."""
         return None if self.raw is None else self.raw.voltage_v
 
     @property
     def untouched(self) -> bool:
-        """It is a frame of a tare."""
+        """Return whether it is a frame of a tare."""
         return self.raw is not None and self.raw.untouched
 
     @property
     def refused(self) -> str | None:
-        """Why the board's core refused the frame; None where it did not."""
+        """Why the board's core refused the frame; None if it did not."""
         info = self.info
         return status_text(info.status) if info is not None and info.status else None
 
@@ -200,8 +200,8 @@ class Frame:
     @cached_property
     def touch_image(self) -> npt.NDArray[np.float32] | None:
         """The touches as discs and ellipses of one height, (n,) S/m: the bits that the board's core
-        would draw. None where the board says that they do not explain the frame, where it sent no
-        touches, or without its model."""
+        would draw. None if the board reports that they do not explain the frame, if it sent no
+        touches, or if its model is not known."""
         known, info = self.known, self.info
         if known is None or info is None or info.shown != "touches" or not self.touches:
             return None
@@ -209,8 +209,8 @@ class Frame:
 
     @property
     def image(self) -> npt.NDArray[np.float32] | None:
-        """The image that shows the frame, (n,) S/m: ``touch_image``, and where there is none
-        ``solver_image``; None where the frame has neither."""
+        """The image that shows the frame, (n,) S/m: ``touch_image``, and if there is none
+        ``solver_image``; None if the frame has neither."""
         return self.solver_image if self.touch_image is None else self.touch_image
 
     @property
@@ -249,12 +249,12 @@ class Frame:
 
     @cached_property
     def placed(self) -> tuple[PlacedTouch, ...] | None:
-        """The touches in the frame of the skin's link; None where that is not known."""
+        """The touches in the frame of the skin's link; None if that is not known."""
         return _placed(self.placement, self.touches)
 
     @property
     def found_mm(self) -> FloatArray | None:
-        """Places (k, 2) of the touches, without them those in the image; None where the frame has
+        """Places (k, 2) of the touches, without them those in the image; None if the frame has
         neither."""
         if not self.has_touches:
             return self.places_mm

@@ -17,7 +17,7 @@ class Observer(Protocol):
         """The solver looks for such changes from now on: "increase", "decrease" or "both"."""
 
     def over(self, board_us: int) -> bool:
-        """Whether there is nothing more to see in a frame whose scan began then."""
+        """Return whether there is nothing more to see in a frame whose scan began then."""
 
     def see(self, frame: Frame) -> Frame:
         """Return ``frame`` with the observer's knowledge about it."""

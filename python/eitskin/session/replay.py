@@ -43,7 +43,7 @@ class Replay:
         return time_us - self._start_us + self._offset_us
 
     def again(self) -> "Replay | None":
-        """The recording once more, as if it went on; None where it showed no time that passes."""
+        """The recording once more, as if it went on; None if it showed no time that passes."""
         if self.last_us <= self._offset_us:
             return None
         return Replay(self._every, self.last_us + self._step_us)

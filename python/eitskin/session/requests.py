@@ -23,7 +23,7 @@ class Requests:
         self._closed: str | None = None
 
     def ask(self, action: Callable[[Device], T]) -> Future[T]:
-        """Let ``action`` be carried out; after ``close`` its answer is there at once."""
+        """Request ``action``; after ``close`` it is answered at once."""
         answer: Future[T] = Future()
         with self._lock:
             if self._closed is None:
@@ -38,7 +38,7 @@ class Requests:
         return bool(self._waiting)
 
     def carry_out(self, device: Device) -> None:
-        """Carry out what waits; the caller owns the board."""
+        """Carry out the waiting requests; the caller owns the board."""
         while (one := self._next()) is not None:
             answer, action = one
             if not answer.set_running_or_notify_cancel():
@@ -51,14 +51,13 @@ class Requests:
                     raise  # Ctrl-C ends the session, too
 
     def refuse(self, reason: str) -> None:
-        """Answer what waits with ``reason``."""
+        """Answer the waiting requests with ``reason``."""
         while (one := self._next()) is not None:
             if one[0].set_running_or_notify_cancel():
                 one[0].set_exception(DeviceError(reason))
 
     def close(self, reason: str) -> None:
-        """Answer what waits, and whatever is asked from now on, with ``reason``; the first
-        counts."""
+        """Answer all waiting and later requests with ``reason``; the first reason counts."""
         with self._lock:
             self._closed = self._closed or reason
         self.refuse(self._closed)

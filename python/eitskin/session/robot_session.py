@@ -160,12 +160,12 @@ class RobotSession:
 
     @property
     def timed(self) -> bool:
-        """All skins are simulated, emulated or recorded."""
+        """Return whether all skins are simulated, emulated or recorded."""
         return all(one.timed for one in self.parts.values())
 
     @property
     def replays(self) -> bool:
-        """All are recordings."""
+        """Return whether all are recordings."""
         return all(one.replays for one in self.parts.values())
 
     @property
@@ -218,7 +218,7 @@ class RobotSession:
             raise self._queue.error
 
     def stop(self) -> None:
-        """End after the message that comes next; from any thread."""
+        """End after the next message; any thread may call this."""
         self._queue.end()
         for skin in self._skins:
             skin.session.stop()

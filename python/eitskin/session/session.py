@@ -196,12 +196,13 @@ class Session:
 
     @property
     def replays(self) -> bool:
-        """It is a recording: nothing can be asked of it."""
+        """Return whether it is a recording, which answers no requests."""
         return self.capabilities.replays
 
     @property
     def timed(self) -> bool:
-        """It is simulated, emulated or recorded: ``pacer`` says when frames come."""
+        """Return whether it is simulated, emulated or recorded, so that ``pacer`` decides when
+        frames come."""
         return self.capabilities.own_clock
 
     @property
@@ -222,13 +223,13 @@ class Session:
     # ---- from any thread ----
 
     def stop(self) -> None:
-        """End after the frame that comes next, or now where none comes."""
+        """End after the next frame, or now if none comes."""
         self._stopping.set()
         self.pacer.wake()
 
     def ask(self, action: Callable[[Device], T]) -> Future[T]:
         """Let ``action`` talk to the board between two frames; the stream stops meanwhile. The
-        answer is a DeviceError where the session is over or its board unplugged."""
+        answer is a DeviceError if the session is over or its board is unplugged."""
         answer = self._requests.ask(action)
         self.pacer.wake()
         return answer
@@ -239,20 +240,20 @@ class Session:
 
     @property
     def asked(self) -> bool:
-        """Somebody waits for an answer of the board."""
+        """Return whether a request waits for an answer of the board."""
         return self._requests.waiting
 
     # ---- to be called in ``ask`` ----
 
     def change_mode(self, mode: Stream) -> None:
-        """Stream something else from the next frame on."""
+        """Change the streamed kinds of packets from the next frame on."""
         self.mode, self.settings = mode, replace(self.settings, mode=mode)
         if not self.replays:
             self._every = self.settings.every or self._carried()
 
     def seek(self, time_s: float) -> None:
-        """Go on with a recording at ``time_s``: what lies between is read and not shown. Back from
-        there, it is read from its beginning.
+        """Continue a recording at ``time_s``: messages in between are read and not shown. To go
+        back, it is read from its beginning.
 
         Raises:
             UsageError: it is no recording.
@@ -341,7 +342,7 @@ class Session:
             self._answers_s = limit_s if self._packets.stop(limit_s) else 0.0
 
     def _begin_stream(self) -> None:
-        """Ask for the packets from now on, and for what puts them together."""
+        """Start the stream of packets, and prepare their assembly."""
         how, what = self.settings, self.mode
         if how.report == "drive":
             what |= Stream.DRIVE_TOUCHES
@@ -377,7 +378,7 @@ class Session:
             yield message.confirmed() if self.settings.confirmed else message
 
     def _skipped(self, message: Message) -> bool:
-        """Whether ``message`` lies before the time that was sought."""
+        """Return whether ``message`` lies before the time that was sought."""
         if self._skip_us is None:
             return False
         if isinstance(message, Notice) or message.time_us < self._skip_us:
@@ -386,7 +387,7 @@ class Session:
         return False
 
     def _begin_again(self) -> bool:
-        """Open a looped recording once more; False where nothing comes any more."""
+        """Open a looped recording once more; False if nothing comes any more."""
         again = self._replay.again() if self._replay is not None and self._loops else None
         if again is None:
             return False
@@ -401,8 +402,9 @@ class Session:
         self._begin_stream()
 
     def _answer_requests(self) -> None:
-        """Let others talk to the board; its stream stops meanwhile. A board that does not even stop
-        does not answer: the session ends when the stream starts again, and the requests with it."""
+        """Let other threads use the board; its stream stops in the meantime. A board that does not
+        stop does not answer either: then the session ends when the stream starts again, and the
+        requests end with it."""
         if self.device.link.away:
             reason = f"{self.name}: the board is unplugged; plug it in, then ask again"
             self._requests.refuse(reason)
@@ -414,7 +416,7 @@ class Session:
             self._begin_stream()
 
     def _seen(self, message: Message) -> Iterator[Message]:
-        """``message`` as consumers get it, after the notices that it gives rise to."""
+        """Yield ``message`` in the form for consumers, after the notices that it causes."""
         now_s = None if self.replays else time.time()
         self.summary.add(message)
         if isinstance(message, Notice):
@@ -515,7 +517,7 @@ class Session:
         self._every = how.every or self._carried()
 
     def _watch_start(self) -> None:
-        """Say how far a slow board is, until its scene begins."""
+        """Report the progress of a slow board until its scene begins."""
         start = time.monotonic()
 
         def progress(board_s: float) -> None:

@@ -43,7 +43,7 @@ def set_up(
 def wait_untouched(
     take: Callable[[], None], say: Callable[[str], None], wait_s: float = UNTOUCHED_S
 ) -> None:
-    """``take`` the reference; while something touches the skin, say so and try again.
+    """Call ``take`` for the reference; while something touches the skin, report it and try again.
 
     Raises:
         SkinTouchedError: something still does after ``wait_s``.

@@ -99,7 +99,7 @@ class SessionSettings:
         return scan, replace(SolverSettings(**kept), **own)
 
     def refuse_of_recording(self, name: str) -> None:
-        """Refuse settings for a recording, which takes none."""
+        """Reject settings for a recording, which takes none."""
         named: dict[str, Any] = {**self.scan.named, **self.solver.named}
         if self.preset is not None:
             named["preset"] = True

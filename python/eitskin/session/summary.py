@@ -51,8 +51,8 @@ class Summary:
 
     @property
     def solve_quantiles_us(self) -> tuple[float, float] | None:
-        """Median and 99th percentile; None where nothing was solved, or the board measures no times
-        (a simulated one)."""
+        """Median and 99th percentile; None if nothing was solved, or the board measures no times (a
+        simulated one)."""
         if self.solve_us.largest <= 0:
             return None
         return self.solve_us.quantile(0.5), self.solve_us.quantile(0.99)

@@ -122,7 +122,7 @@ class _Area:
         return [Outline(tuple(map(tuple, (middle + r * rim).tolist()))) for r in radii]
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """Whether each of (k, 2) lies in it."""
+        """Return whether each of (k, 2) lies in it."""
         outer, *inner = self.loops
         inside = outer.contains(points)
         return inside & ~inner[0].contains(points) if inner else inside
@@ -154,7 +154,7 @@ def _refuse_crossings(areas: list[_Area], path: str | Path) -> None:
 
 
 def _cross(one: Outline, other: Outline) -> bool:
-    """Whether an edge of one crosses an edge of the other, touching aside."""
+    """Return whether an edge of one crosses an edge of the other, touching aside."""
     a, c = np.array(one.vertices_mm)[:, None], np.array(other.vertices_mm)[None]
     b, d = np.roll(a, -1, axis=0), np.roll(c, -1, axis=1)
 

@@ -234,7 +234,7 @@ class Queue:
             self._changed.notify_all()
 
     def begin_end(self) -> None:
-        """Refuse further items."""
+        """Reject further items."""
         with self._changed:
             self._ending = True
             self._changed.notify_all()

@@ -27,11 +27,11 @@ class Dropped(Exception):
 @dataclass(frozen=True, eq=False)
 class TouchSource:
     """The origin of touches: the device's URL, its board, and its model if the host has it.
-    ``overwrite`` allows overwriting existing files. ``name`` is the source's name as given, None
-    where none was, and ``source`` the one in messages, which is then the board's serial number.
-    ``tare`` takes the reference again, from any thread; None where there is no board. ``link`` is
-    the frame of reference that messages give places in, if there is one. ``skins`` are the sources
-    of a robot, which has neither board nor model itself; empty: it is no robot."""
+    ``overwrite`` allows overwriting existing files. ``name`` is the source's name as given, None if
+    none was, and ``source`` the one in messages, which is then the board's serial number. ``tare``
+    takes the reference again, from any thread; None if there is no board. ``link`` is the frame of
+    reference that messages give places in, if there is one. ``skins`` are the sources of a robot,
+    which has neither board nor model itself; empty: it is no robot."""
 
     url: str
     board: str = ""

@@ -52,7 +52,7 @@ class Cursors:
 
     @property
     def some(self) -> bool:
-        """Whether the last messages had touches."""
+        """Return whether the last messages had touches."""
         return bool(self._before)
 
     def _state(self, touch: dict[str, Any], elapsed_s: float) -> State:

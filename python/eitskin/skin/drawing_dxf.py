@@ -94,7 +94,7 @@ def _scale_of(document: Any, where: str) -> float:
 
 
 def _refuse_copies(document: Any, where: str) -> None:
-    """Refuse blocks that insert each other in a circle, and drawings with more copies than any
+    """Reject blocks that insert each other in a circle, and drawings with more copies than any
     outline needs, before a copy is made."""
     counts: dict[str, int] = {}
 

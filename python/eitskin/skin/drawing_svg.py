@@ -126,7 +126,7 @@ def _length_mm(text: str | None) -> float | None:
 
 
 def _refuse_copies(root: ET.Element, where: str) -> None:
-    """Refuse <use> elements that refer to each other in a circle, and more copies of copies than
+    """Reject <use> elements that refer to each other in a circle, and more copies of copies than
     could be parsed in reasonable time."""
     by_id = {one.get("id"): one for one in root.iter() if one.get("id")}
     counts: dict[int, tuple[int, int]] = {}  # number of elements, and of words in their paths

@@ -211,7 +211,7 @@ class Reconstructor:
             return result if self._tracker is None else self._tracker.followed(result)
 
     def _follows_drives(self) -> bool:
-        """Whether drives are followed; the tracker begins at the first."""
+        """Return whether drives are followed; the tracker begins at the first."""
         if self._tracker is None or not self._tracker.rows:
             return False
         if not self._begun:

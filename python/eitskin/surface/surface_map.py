@@ -60,9 +60,8 @@ class SurfaceTouch:
     ``point_m``, ``normal`` (outwards) and ``tangents`` (3, 2) are as in :class:`SurfacePlaces`. A
     finger presses against the normal. ``strength_s_m`` is the conductivity change integrated over
     the touch, in S m^2/m. ``covariance_m2`` (3, 3) is that of the point, 0 along the normal; None
-    where it is not known. ``long_axis_m`` (3,) is half of the long axis of the touch's ellipse;
-    None where the data show no shape.
-    """
+    if it is not known. ``long_axis_m`` (3,) is half of the long axis of the touch's ellipse; None
+    if the data show no shape."""
 
     point_m: FloatArray
     normal: FloatArray
@@ -123,8 +122,8 @@ class SurfaceMap:
 
     @property
     def angle_error(self) -> float:
-        """The ratio of a triangle's greater to its lesser scale that 95 % of the area stay below;
-        1 where the map is conformal. Linear triangles add about their size over the radius of
+        """The ratio of a triangle's greater to its lesser scale that 95 % of the area stay below; 1
+        if the map is conformal. Linear triangles add about their size over the radius of
         curvature."""
         ratio = self.stretches[:, 0] / self.stretches[:, 1]
         order = np.argsort(ratio)

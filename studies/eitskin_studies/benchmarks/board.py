@@ -90,9 +90,8 @@ class ImageSize:
 @dataclass(frozen=True)
 class BoardRate:
     """The emulated NUCLEO-F767ZI on a scene of two touches: rows and samples measured a frame, the
-    time that takes, solve and touches on the board (interrupts included), frames a second, and the
-    stack that the firmware used.
-    """
+    time that takes, solve and touches on the board (interrupts included), frames per second, and
+    the stack that the firmware used."""
 
     storage: str
     rows: int

@@ -159,7 +159,7 @@ class _Eye:
         self._solver.tare(untouched_v)
 
     def look(self, frame_v: FloatArray, blind: bool = False) -> Reconstruction | None:
-        """None where the frame is refused."""
+        """None if the frame is refused."""
         self._solver.set_options(diagnostics=0 if blind else self._all)
         self._solver.forget()
         try:

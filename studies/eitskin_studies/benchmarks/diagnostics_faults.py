@@ -24,10 +24,9 @@ class InjectedFault:
 
     ``volts`` makes the exact voltages from those of the touched frame; ``readings`` spoils what
     noise and converter made of them. ``named`` is whether a frame was called by its name,
-    electrodes and all; None where it has none. ``half``: a scan of one row of each reciprocal pair.
+    electrodes and all; None if it has none. ``half``: a scan of one row of each reciprocal pair.
     ``gain``: what the peak is to be multiplied by. ``lifted``: the touch was there during the tare,
-    and no image is judged.
-    """
+    and no image is judged."""
 
     name: str
     named: Callable[[SceneCase, Info], bool] | None

@@ -79,7 +79,7 @@ def measuring_mw() -> float:
 
 
 def energy_of(point: OperatingPoint, where: Conditions) -> PointEnergy | None:
-    """None where accuracy or instructions were not measured, or the board does not hold it."""
+    """None if accuracy or instructions were not measured, or the board does not hold it."""
     solve_us, miou = point.cost("us", "f767", where), point.accuracy(where)
     if solve_us is None or miou is None or not point.fits_f767:
         return None
@@ -188,7 +188,7 @@ def points_table(result: EnergyResult) -> Tabular:
 
 
 def sleep_table(result: EnergyResult) -> Tabular:
-    """The cheapest point at fewer frames a second, by how the board waits."""
+    """The cheapest point at fewer frames per second, by how the board waits."""
     one = result.cheapest
     rows = []
     for name, waiting in waiting_mw().items():

@@ -51,8 +51,8 @@ class KernelAgainstLimit:
 
     @property
     def hot(self) -> bool:
-        """Whether a prepared context calls it in each frame; the others serve contexts without room
-        for panels."""
+        """Return whether a prepared context calls it in each frame; the others serve contexts
+        without room for panels."""
         name = self.timing.name
         by_columns = (name, self.timing.storage) == ("mul, 48 columns", "f32")
         return by_columns or name.startswith(("panels", "dot", "axpy", "prox", "unpack"))

@@ -303,7 +303,7 @@ def _scored(
 
 
 def _covered(true: TrueTouch, found: Touch) -> bool | None:
-    """Whether the true centre lies in the 90 % ellipse of the found one."""
+    """Return whether the true centre lies in the 90 % ellipse of the found one."""
     if not found.x_variance_mm2 or not found.y_variance_mm2:
         return None
     cross = found.xy_covariance_mm2 or 0.0
@@ -344,7 +344,7 @@ def _rows(bench: _Bench) -> Iterable[Row]:
 def _between(
     of: Callable[[TouchResult], float], low: float, high: float
 ) -> Callable[[TouchResult], bool]:
-    """Whether a number of a touch is from ``low`` to below ``high``."""
+    """Return whether a number of a touch is from ``low`` to below ``high``."""
     return lambda touch: low <= of(touch) < high
 
 

@@ -59,7 +59,7 @@ WebSocket.prototype.send = function (data) {
 
 @dataclass(frozen=True)
 class LiveView:
-    """With ``pages`` looking on: frames a second that were sent to each, the server's share of a
+    """With ``pages`` looking on: frames per second that were sent to each, the server's share of a
     core (all of it: simulated board, solver, page), frames that were dropped, and the times from a
     frame that is complete to its pixels, in ms (the first page, in Chromium); the server's memory
     when the measurement began and at its end."""

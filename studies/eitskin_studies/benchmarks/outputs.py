@@ -198,7 +198,7 @@ def _listen(name: str, frames: int, pipe: Connection) -> None:
 
 
 def _sink(name: str, scene: Path, seconds: float) -> FloatArray:
-    """From each frame to another process that has read it, ms, at 48 frames a second."""
+    """From each frame to another process that has read it, ms, at 48 frames per second."""
     frames = max(int(seconds * RATE_HZ), 8)
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
@@ -219,7 +219,7 @@ def _sink(name: str, scene: Path, seconds: float) -> FloatArray:
 
 
 def _load(place: Path, scene: Path, seconds: float) -> Load:
-    """All sinks at once at 48 frames a second, touches and images."""
+    """All sinks at once at 48 frames per second, touches and images."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drain, socket.socket() as probe:
         for one in (drain, probe):
             one.bind(("127.0.0.1", 0))

@@ -34,7 +34,7 @@ MAX_S = 3.0
 
 @dataclass
 class Timed:
-    """One solver at one level: seconds a problem in each round; None where a problem did not get
+    """One solver at one level: seconds a problem in each round; None if a problem did not get
     there."""
 
     name: str

@@ -110,7 +110,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Refuse before the work what would fail after it."""
+    """Reject before the work what would fail after it."""
     from eitskin.solve.batch import check_threads
 
     if not -20 <= options.snr_db <= 200:

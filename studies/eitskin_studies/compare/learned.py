@@ -130,7 +130,7 @@ class _Training:
 
 def turned_rows(protocol: Protocol) -> dict[int, IntArray]:
     """For each number of electrodes by which a scan can be turned, the row that each row becomes;
-    empty where it is another scan when it is turned by one."""
+    empty if it is another scan when it is turned by one."""
     rows = {tuple(row): k for k, row in enumerate(protocol.drive_measure.tolist())}
     count, turns = protocol.n_electrodes, {}
     for turn in range(count):

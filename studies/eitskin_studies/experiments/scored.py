@@ -91,9 +91,8 @@ class Evaluator:
         self, scenes: Sequence[TouchScene], untouched_v: FloatArray, frames_v: FloatArray, t: float
     ) -> dict[str, list[Any]]:
         """Lists fit for JSON: a scene's image and disc MIoU, exact count, false touches, kMAC; of
-        each true touch its scene and place, and the distance of the found one, None where it was
-        missed; a scene's found touches [x, y, radius].
-        """
+        each true touch its scene and place, and the distance of the found one, None if it was
+        missed; a scene's found touches [x, y, radius]."""
         results = reconstruct_many(self.model, frames_v, untouched_v, threads=1)
         truths = self.truths(scenes)
         images = np.array([one.solver_image for one in results], dtype=np.float64)

@@ -58,7 +58,7 @@ class Seen:
 
     @property
     def once(self) -> bool:
-        """Whether it had one id, without a gap, from its first report to its lift."""
+        """Return whether it had one id, without a gap, from its first report to its lift."""
         return bool(self.ids) and not self.gap and len(set(self.ids)) == 1
 
 

@@ -64,13 +64,13 @@ class DrawnGesture:
 
     @property
     def is_light(self) -> bool:
-        """Whether a finger changes the skin less than one of 7 mm that conducts nine times as much
-        as the sheet, about the paper's finger."""
+        """Return whether a finger changes the skin less than one of 7 mm that conducts nine times
+        as much as the sheet, about the paper's finger."""
         return any((one.contrast - 1) * one.radius_mm**2 < 8 * 7.0**2 for one in self.fingers)
 
     @property
     def is_gesture(self) -> bool:
-        """Whether anything but down, move and up may be reported."""
+        """Return whether anything but down, move and up may be reported."""
         return self.kind not in NONE
 
 

@@ -20,7 +20,7 @@ FLAGS = (
 
 
 def need_browser() -> None:
-    """Refuse before anything is done where no browser can be driven.
+    """Reject before anything is done where no browser can be driven.
 
     Raises:
         MissingExtraError: selenium is not installed.

@@ -139,7 +139,7 @@ def _summary(of: Summary) -> dict[str, float]:
 
 
 def _error(values: npt.ArrayLike) -> dict[str, float | None]:
-    """Median and 95th percentile of errors; None where there is none to take them of."""
+    """Median and 95th percentile of errors; None if there is none to take them of."""
     data = np.asarray(values, dtype=np.float64).reshape(-1)
     if not len(data):
         return {"median": None, "p95": None}

@@ -54,7 +54,7 @@ class ModelShop:
         self._raster = metrics.raster_inside(skin.outline)
 
     def refuse(self, one: Configuration) -> None:
-        """Refuse a configuration whose model could not be made.
+        """Reject a configuration whose model could not be made.
 
         Raises:
             UsageError: its rank exceeds what protocol and grid allow.

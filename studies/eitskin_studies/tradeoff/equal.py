@@ -47,7 +47,7 @@ class Reached:
 
     @property
     def ours(self) -> bool:
-        """Whether it is of this project."""
+        """Return whether it is of this project."""
         return self.name.startswith("eitskin")
 
     @property

@@ -253,7 +253,7 @@ def _score(
 def _instructions(
     workspace: _Desk, configurations: Sequence[Configuration], folder: Path
 ) -> tuple[dict[str, dict[str, Any] | None], str]:
-    """Counted instructions by configuration, None where they were not; and a word about how."""
+    """Counted instructions by configuration, None if they were not; and a word about how."""
     how, found = workspace.settings, {}
     wanted: list[Configuration] = []
     for one in configurations:

@@ -33,7 +33,7 @@ def best_points(points: Sequence[OperatingPoint], where: Conditions) -> list[Ope
 
 
 def to_csv(front: Front) -> str:
-    """A line a configuration, set and SNR; empty where something was not measured."""
+    """A line a configuration, set and SNR; empty if something was not measured."""
     lines = io.StringIO()
     rows = [row for point in front.points for row in _rows(point)]
     writer = csv.DictWriter(lines, fieldnames=list(rows[0]), lineterminator="\n")

@@ -57,7 +57,7 @@ class WorldScore:
         median_mm, p95_mm: distance of found touches from the true ones; None where none was found.
         radius_ratio: median of found over true radius.
         warned: of the scenes that are not exact, the share in which the finder names something
-            wrong with the frame; None where it names nothing ever, or all are exact.
+            wrong with the frame; None if it names nothing ever, or all are exact.
         refused: scenes whose frames the finder rejects; their touches count as missed.
     """
 

@@ -23,7 +23,7 @@ class Fixture:
         self._ohm: FloatArray = np.asarray(np.linalg.inv(laplacian), dtype=np.float64)
 
     def transfer_ohm(self, joined: Joined) -> float:
-        """Volts from V- to V+ per ampere from I+ to I-; 0 where one of them is open."""
+        """Volts from V- to V+ per ampere from I+ to I-; 0 if one of them is open."""
         if None in joined:
             return 0.0
         a, b, c, d = (int(one or 0) for one in joined)

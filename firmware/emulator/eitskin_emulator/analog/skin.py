@@ -71,7 +71,7 @@ class AnalogSkin:
         self._began += round(len(self.frames_v) * TICKS_PER_S / self.rate_hz)
 
     def over(self, at: int) -> bool:
-        """Whether the scene has ended."""
+        """Return whether the scene has ended."""
         return self._began is not None and self.frame_number(at) >= len(self.frames_v)
 
     def frame_number(self, at: int) -> int:

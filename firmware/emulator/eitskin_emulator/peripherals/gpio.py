@@ -58,7 +58,7 @@ class GpioPort(Registers):
         return self.values[MODER] >> 2 * pin & 3
 
     def has_function(self, pin: int, function: int) -> bool:
-        """Whether ``pin`` is in alternate function ``function``."""
+        """Return whether ``pin`` is in alternate function ``function``."""
         word = self.values[AFRL] if pin < 8 else self.values[AFRH]
         return self.mode(pin) == ALTERNATE and word >> 4 * (pin & 7) & 0xF == function
 

@@ -38,7 +38,7 @@ class Iwdg(Registers):
 
     @property
     def running(self) -> bool:
-        """Whether it has been started."""
+        """Return whether it has been started."""
         return self._on
 
     @property
@@ -89,5 +89,5 @@ class DebugControl(Registers):
 
     @property
     def stops_watchdog(self) -> bool:
-        """Whether the watchdog stands still while the processor is halted."""
+        """Return whether the watchdog stands still while the processor is halted."""
         return bool(self.values[APB1_FREEZE] >> 12 & 1)

@@ -26,7 +26,8 @@ class MpuRegion:
         return 1 << ((self.attributes >> 1 & 0x1F) + 1)
 
     def covers(self, address: int) -> bool:
-        """Whether it is enabled and ``address`` lies in it, not in a subregion that is left out."""
+        """Return whether it is enabled and ``address`` lies in it, not in a subregion that is left
+        out."""
         size = self.size
         if (
             not self.attributes & 1
@@ -76,7 +77,7 @@ class Mpu:
         return next((one for one in reversed(self._regions) if one.covers(address)), None)
 
     def denies(self, address: int) -> bool:
-        """Whether ``address`` may not be used."""
+        """Return whether ``address`` may not be used."""
         region = self.region(address)
         return region is not None and region.denies
 

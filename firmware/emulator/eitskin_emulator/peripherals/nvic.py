@@ -54,7 +54,7 @@ class Nvic:
         self.changed = True
 
     def is_active(self, number: int) -> bool:
-        """Whether its handler has begun and not returned."""
+        """Return whether its handler has begun and not returned."""
         return number in self.active
 
     # ---- which is next ----

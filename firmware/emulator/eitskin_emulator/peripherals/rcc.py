@@ -69,7 +69,7 @@ class Rcc(Registers):
     # ---- who is clocked how ----
 
     def clocked(self, gate: tuple[str, int]) -> bool:
-        """Whether a peripheral's enable bit is set."""
+        """Return whether a peripheral's enable bit is set."""
         return bool(self.values[ENABLES[gate[0]]] >> gate[1] & 1)
 
     @property

@@ -97,7 +97,7 @@ class Timer(Registers):
 
     @property
     def counting(self) -> bool:
-        """Whether it runs."""
+        """Return whether it runs."""
         return bool(self.values[CR1] & CEN) and self._gate_open
 
     def _now_counted(self, at: int) -> tuple[int, int, int]:

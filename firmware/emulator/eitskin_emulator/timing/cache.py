@@ -14,7 +14,8 @@ class Cache:
         self.misses = 0
 
     def use(self, line: int, store: bool = False) -> tuple[bool, bool]:
-        """Whether ``line`` (address >> 5) was there, and whether a changed one had to go for it."""
+        """Return whether ``line`` (address >> 5) was there, and whether a changed one had to go for
+        it."""
         ways = self._sets[line & (SETS - 1)]
         if store:
             self._changed.add(line)

@@ -209,7 +209,7 @@ def read_head(path: str | Path) -> dict[str, Any]:
 
 
 def _noted_scene(url: str) -> SimulatedScene | None:
-    """The scene before the recorded board; None where the skin was real."""
+    """The scene before the recorded board; None if the skin was real."""
     scheme, _, name = url.removesuffix(LOOP).partition(":")
     if scheme not in ("sim", "emu"):
         return None
@@ -217,7 +217,7 @@ def _noted_scene(url: str) -> SimulatedScene | None:
 
 
 def _loop_mark(scene: SimulatedScene | None) -> str:
-    """What follows the URL of a scene that begins again at its end."""
+    """Return the text that follows the URL of a scene which begins again at its end."""
     return LOOP if scene is not None and scene.loop and not scene.recorded else ""
 
 
@@ -232,7 +232,7 @@ def _noted_hashes(noted: Any) -> BoardHashes:
 
 
 def recorded_options(path: str | Path) -> Options | None:
-    """The solver's options that the recording notes; None where it notes none.
+    """The solver's options that the recording notes; None if it notes none.
 
     Raises:
         FileError, DeviceError: as ``read_head``; or the note cannot be read.

@@ -29,13 +29,13 @@ def field_at(command: int, offset: int) -> str:
 
 
 def found_touched(reply: Reply) -> bool:
-    """Whether a tare was refused because something landed, moved or lifted meanwhile."""
+    """Return whether a tare was refused because something landed, moved or lifted meanwhile."""
     touched = int(load_core("float32").lib.EITS_E_REFERENCE_TOUCHED)
     return reply.status == ReplyStatus.CORE and reply.detail[0] == touched
 
 
 def reply_text(reply: Reply) -> str:
-    """Why a command was refused, and what to do; for a reply that is not OK."""
+    """Return the reason why a command was rejected, and what to do, for a reply that is not OK."""
     name, (first, second) = command_name(reply.command), reply.detail
     texts = {
         ReplyStatus.OK: "done",

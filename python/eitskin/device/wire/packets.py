@@ -96,7 +96,7 @@ class BoardInfo(InfoPacket):
 
     @property
     def drive_name(self) -> str:
-        """Whether current may flow: "on", "off", "silent" or "tripped"."""
+        """Return whether current may flow: "on", "off", "silent" or "tripped"."""
         return Drive(self.drive).name.lower() if self.drive in list(Drive) else str(self.drive)
 
     def as_dict(self) -> dict[str, Any]:
@@ -114,10 +114,10 @@ class BoardInfo(InfoPacket):
 
 @dataclass(frozen=True)
 class BoardHashes(HashesPacket):
-    """SHA-256 of the model in use and of the program, zero where there is none."""
+    """SHA-256 of the model in use and of the program, zero if there is none."""
 
     def as_dict(self) -> dict[str, str | None]:
-        """For JSON: hexadecimal, None where there is none."""
+        """For JSON: hexadecimal, None if there is none."""
         both = {"model": self.model, "firmware": self.firmware}
         return {name: one.hex() if any(one) else None for name, one in both.items()}
 
@@ -147,7 +147,7 @@ class RawFrame:
 
     @property
     def untouched(self) -> bool:
-        """Whether this frame belongs to a tare."""
+        """Return whether this frame belongs to a tare."""
         return bool(self.flags & RawFlags.REFERENCE)
 
 

@@ -1,4 +1,4 @@
-"""Sequence numbers: which packet is next, which are missing, and which are no news.
+"""Sequence numbers: find the next packet, missing ones, and duplicates.
 
 Numbers count every packet of a direction, modulo 2^32, and a packet that the sender dropped keeps
 its number. A board's numbers begin again when it restarts, which it says by an INFO with request 0;

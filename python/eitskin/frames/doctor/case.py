@@ -41,7 +41,7 @@ class Case:
 
     @property
     def reference(self) -> FloatArray:
-        """The mean untouched frame (m,), 0 where it is not finite."""
+        """The mean untouched frame (m,), 0 if it is not finite."""
         with np.errstate(invalid="ignore", over="ignore"):
             return np.asarray(
                 np.nan_to_num(self.frames.reference_voltage_v.mean(axis=0), posinf=0.0, neginf=0.0)

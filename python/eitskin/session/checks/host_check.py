@@ -107,8 +107,8 @@ class HostTwin:
         return self.check
 
     def lost(self) -> None:
-        """Something is missing here: perhaps a frame from which the next solve began, perhaps a
-        untouched one."""
+        """Note that something is missing here: perhaps a frame from which the next solve began, or
+        an untouched one."""
         self._sure, self._lost, self._events_known = False, True, False
         if self._drives is not None:
             self._drives.forget()
@@ -119,8 +119,7 @@ class HostTwin:
             self._drives.hear(packet)
 
     def take(self, frame: Frame) -> Reconstruction | None:
-        """The next frame; returns what this host makes of it, None where the board solved
-        nothing."""
+        """The next frame; returns what this host makes of it, None if the board solved nothing."""
         if frame.raw is not None and frame.raw.untouched:
             self._untouched.append(frame.raw)
             return None
@@ -144,7 +143,7 @@ class HostTwin:
         return self._compare(frame, frame.raw, None if aligned is None else aligned.volts)
 
     def _drive(self, raw: RawFrame | None) -> AlignedFrame | None:
-        """The drives of a frame that the board aligned; None where some are missing here."""
+        """The drives of a frame that the board aligned; None if some are missing here."""
         twin = self._drives
         if twin is None or raw is None or not self._tared:
             return None
@@ -202,8 +201,8 @@ class HostTwin:
         return result
 
     def _same_events(self, frame: Frame) -> bool:
-        """Whether the board's events are what its touches give here; known only where all touches
-        since the tare came here."""
+        """Return whether the board's events are what its touches give here; known only where all
+        touches since the tare came here."""
         if frame.board_events is None or not frame.has_touches or frame.refused is not None:
             self._events_known = self._events_known and frame.refused is not None
             return True
@@ -240,12 +239,12 @@ def check_recording(path: Path, model: Path | None) -> tuple[HostCheck, bool]:
 
 
 def same_bits(one: AnyArray, other: npt.NDArray[np.float32]) -> bool:
-    """Whether two images are the same float32 numbers, bit for bit."""
+    """Return whether two images are the same float32 numbers, bit for bit."""
     return one.astype("<f4").tobytes() == other.astype("<f4").tobytes()
 
 
 def same_touches(one: tuple[Touch, ...], other: tuple[Touch, ...]) -> bool:
-    """Whether two lists of touches are the same numbers in the same order, ids apart."""
+    """Return whether two lists of touches are the same numbers in the same order, ids apart."""
     return [_numbers(touch) for touch in one] == [_numbers(touch) for touch in other]
 
 

@@ -1,5 +1,4 @@
-"""Every packet of a session kept in memory, the tare's included, for whoever looks at them
-afterwards."""
+"""Keep every packet of a session in memory, including those of the tare, for later use."""
 
 from collections.abc import Iterator
 from contextlib import suppress

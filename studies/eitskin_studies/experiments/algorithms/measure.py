@@ -30,7 +30,7 @@ TUNING, TEST = "tuning", "test"
 @dataclass(frozen=True)
 class ChosenParameter:
     """The choices made on tuning scenes: the parameter's ``value``, t of MIoU for each lookup, and
-    t of positions (None where the method reports touches itself)."""
+    t of positions (None if the method reports touches itself)."""
 
     value: float
     thresholds: dict[str, float]

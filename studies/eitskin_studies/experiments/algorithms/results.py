@@ -70,7 +70,7 @@ class AlgorithmResult:
         )
 
     def position_mm(self, number: int) -> float:
-        """Median distance of the touches found; nan where none is."""
+        """Median distance of the touches found; nan if none is."""
         distances_mm = self.best[number]["distances_mm"]
         return float(np.median(distances_mm)) if len(distances_mm) else math.nan
 

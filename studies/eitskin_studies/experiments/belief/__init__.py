@@ -80,7 +80,7 @@ def frames_of(finder: CoreFinder, of: WorldScenes) -> list[dict[str, Any]]:
     """Return for each scene that was not rejected how many touches there are (``true``), whether it
     is said to be crowded, and of each found touch whether it is a true one, its confidence, its
     distance from the true place in mm and that over what it is said to be (Mahalanobis, squared);
-    None where that is not known."""
+    None if that is not known."""
     finder.look_for(of.world.sign)
     frames = []
     for scene, *measured in zip(of.scenes, of.untouched_v, of.frames_v, of.step_v, strict=True):

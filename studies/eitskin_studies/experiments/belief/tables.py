@@ -109,7 +109,7 @@ def places_table(sets: Sets) -> Table:
 
 
 def counts_table(sets: Sets) -> Table:
-    """Whether frames that are counted wrong are said to be crowded."""
+    """Return whether frames that are counted wrong are said to be crowded."""
     head = ("set", "count right", "crowded, of right", "crowded, of wrong", "right or crowded")
     rows = []
     for name, frames in sets.items():

@@ -83,8 +83,8 @@ class Tests:
         self.tests = [one for one in map(self._tested, programs) if one is not None]
 
     def _tested(self, program: Path) -> Tested | None:
-        """None where it fails with the variant at the table's values: it has a constant of its own
-        or takes too long."""
+        """None if it fails with the variant at the table's values: it has a constant of its own or
+        takes too long."""
         used = self._folder / "used"
         used.unlink(missing_ok=True)
         if not self._passes(program, EITS_STUDY_USED=str(used)) or not used.exists():

@@ -39,7 +39,7 @@ def tables_of(
 
 
 def any_change(effects: Effects, constant: Constant) -> bool:
-    """Whether one of its values changes a bit of a scene, or ends the run."""
+    """Return whether one of its values changes a bit of a scene, or ends the run."""
     return any(one.changed or one.failed for one in effects[constant.name])
 
 

@@ -98,7 +98,7 @@ class Constant:
 
     @property
     def is_size(self) -> bool:
-        """Whether no variable can stand for it."""
+        """Return whether no variable can stand for it."""
         return self.name in SIZES
 
     def changed(self) -> tuple[float, float]:

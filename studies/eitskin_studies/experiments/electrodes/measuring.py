@@ -228,7 +228,7 @@ def noise_v(workspace: Workspace) -> float:
 
 
 def resolved_mm(scores: Mapping[str, Any], share: float = 0.9) -> float:
-    """The least distance from which on ``share`` of the pairs are counted exactly, in mm; inf where
+    """The least distance from which on ``share`` of the pairs are counted exactly, in mm; inf if
     even the widest are not."""
     least = float("inf")
     for distance in reversed(PAIR_MM):

@@ -67,7 +67,7 @@ def unique_rows(protocol: Protocol, every: int = 1) -> Protocol:
 
 def samples_within(rows: int, frame_us: float = FRAME_US) -> int:
     """Samples of a measurement where ``rows`` are to be measured in ``frame_us``: whole periods
-    beside settling and switching, in a slot of whole periods; 0 where not even one period fits."""
+    beside settling and switching, in a slot of whole periods; 0 if not even one period fits."""
     slot_us = int(frame_us / rows / PERIOD_US) * PERIOD_US
     return max(0, (slot_us - SETTLE_US - SWITCH_US) // PERIOD_US * PERIOD_US)
 

@@ -81,8 +81,8 @@ def all_tables(results: Results) -> tuple[Table, ...]:
 
 
 def is_usual(case: PatternCase) -> bool:
-    """Whether a case has the rank and the grid that its number of electrodes has in the tables of
-    patterns."""
+    """Return whether a case has the rank and the grid that its number of electrodes has in the
+    tables of patterns."""
     return case == usual_case(case.electrodes, case.pattern, case.equal)
 
 

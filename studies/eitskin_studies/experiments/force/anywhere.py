@@ -23,7 +23,7 @@ class Anywhere:
     """One readout at one SNR, on places that nothing was tuned on.
 
     Attributes:
-        raw: readings over the mean of their weight, less 1: (places, weights); NaN where the press
+        raw: readings over the mean of their weight, less 1: (places, weights); NaN if the press
             was not found.
         calibrated: forces over the true ones, less 1; likewise.
         order, form: of the gain and the law that leaving places out chose on the tuning places.

@@ -30,7 +30,7 @@ READOUTS = (PEAK, INTEGRAL, IMAGE_PEAK, IMAGE_INTEGRAL, TOUCH, LOG_INTEGRAL, LOG
 
 @dataclass(frozen=True, eq=False)
 class Readout:
-    """The readings of k frames: ``value`` (k,), NaN where nothing was found; ``place_mm`` (k, 2)
+    """The readings of k frames: ``value`` (k,), NaN if nothing was found; ``place_mm`` (k, 2)
     where; ``macs`` a frame, 0: not counted."""
 
     value: FloatArray

@@ -88,7 +88,7 @@ def place(rng: np.random.Generator, reach_mm: float = REACH_MM) -> FloatArray:
 def apart(
     rng: np.random.Generator, others: list[Finger], gap_mm: float, reach_mm: float = REACH_MM
 ) -> FloatArray | None:
-    """A place at least ``gap_mm`` from where the others are; None where there is hardly one."""
+    """A place at least ``gap_mm`` from where the others are; None if there is hardly one."""
     for _ in range(999):
         here = place(rng, reach_mm)
         if all(np.hypot(*(here - at)) > gap_mm for one in others for at in (one.begin, one.end)):

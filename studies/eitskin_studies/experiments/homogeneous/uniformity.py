@@ -84,15 +84,14 @@ def uniformity(voltage_v: FloatArray, protocol: Protocol, fold: Fold) -> Uniform
 
 
 def deviations_percent(folded: FloatArray) -> FloatArray:
-    """Each value's distance from the mean over drives, percent of that mean, (n, n - 3): above 0
-    where larger in size."""
+    """Each value's distance from the mean over drives, percent of that mean, (n, n - 3): above 0 if
+    larger in size."""
     mean = folded.mean(axis=0)
     return np.asarray(100 * (folded / mean - 1))
 
 
 def _pairs(given: IntArray, n: int) -> tuple[IntArray, IntArray]:
-    """The first electrode of each pair (m, 2) of neighbours, and -1 where the pair is turned
-    round."""
+    """The first electrode of each pair (m, 2) of neighbours, and -1 if the pair is turned round."""
     ahead = (given[:, 1] - given[:, 0]) % n
     if not np.isin(ahead, (1, n - 1)).all():
         row = int(np.argmin(np.isin(ahead, (1, n - 1))))

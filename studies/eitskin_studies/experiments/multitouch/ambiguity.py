@@ -36,7 +36,7 @@ BINS = 10
 @dataclass(frozen=True)
 class ScoredFrame:
     """A frame, its result, and the features that could predict the result. ``found`` touches;
-    ``nearest`` pair's distance over the sum of its radii (inf where there is none)."""
+    ``nearest`` pair's distance over the sum of its radii (inf if there is none)."""
 
     snr_db: float
     true: int

@@ -47,7 +47,7 @@ class GivenPlaces(OracleEngine):
 
 
 def core_told(model: Model, measured: MeasuredFrames, scenes: Sequence[TouchScene]) -> list[bool]:
-    """Whether the fit that begins at the truth is exact, for each scene."""
+    """Return whether the fit that begins at the truth is exact, for each scene."""
     engine = GivenPlaces(model)
     engine.set_reference(measured.untouched_v)
     exact = []
