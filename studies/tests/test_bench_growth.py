@@ -8,6 +8,7 @@ import pytest
 from eitskin.cli.main import main
 from eitskin_studies.benchmarks import batches as bench_batches
 from eitskin_studies.benchmarks import growth as bench_growth
+from eitskin_studies.harness.drawings import Drawing
 from eitskin_studies.harness.sections import fill_marks
 from eitskin_studies.pictures.growth_picture import draw_growth
 from study_pages import page_copy
@@ -41,8 +42,11 @@ def test_counts_are_exact_and_models_are_kept(tmp_path):
     fill_marks(page, "benchmarks", (texts, tables))
     assert "By `the command`" in page.read_text()
     assert f"{many.macs / 1e3:.0f}" in bench_growth.as_text(first)
-    draw_growth(tmp_path / "p.png", first)
-    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+    numbers = bench_growth.drawn(first)
+    Drawing(draw_growth, numbers)(tmp_path / "p.svg")
+    assert "pixels n" in (tmp_path / "p.svg").read_text(encoding="utf-8")
+    assert [len(one["values"]) for one in numbers["sweeps"]] == [2, 1]
+    assert numbers["sweeps"][0]["touches_kmac"][1] == round(many.touch_macs / 1e3, 1)
     assert json.loads(json.dumps(first.as_dict()))["points"][0]["macs"] == few.macs
 
 

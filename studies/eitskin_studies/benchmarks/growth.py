@@ -247,12 +247,36 @@ def summary(result: GrowthTimes) -> str:
     for name in dict.fromkeys(p.sweep for p in result.points):
         points = result.sweep(name)
         if len(points) > 1:
-            macs, time = (
-                exponent(points, lambda p: p.macs + p.touch_macs),
-                exponent(points, lambda p: p.whole_us),
-            )
+            time, macs = _exponents(points)
             parts.append(f"{name}: MACs ^{macs:.2f}, time ^{time:.2f}")
     return "; ".join(parts)
+
+
+def drawn(result: GrowthTimes) -> dict[str, Any]:
+    """The numbers of the picture, series by series."""
+    sweeps = []
+    for name in dict.fromkeys(p.sweep for p in result.points):
+        points = result.sweep(name)
+        time, macs = _exponents(points) if len(points) > 1 else (0.0, 0.0)
+        sweeps.append(
+            {
+                "name": name,
+                "values": [p.value for p in points],
+                "time": round(time, 2),
+                "macs": round(macs, 2),
+                "solve_us": [round(p.solve_us, 1) for p in points],
+                "touches_us": [round(p.touch_us, 1) for p in points],
+                "solve_kmac": [round(p.macs / 1e3, 1) for p in points],
+                "touches_kmac": [round(p.touch_macs / 1e3, 1) for p in points],
+            }
+        )
+    return {"sweeps": sweeps}
+
+
+def _exponents(points: Sequence[Growth]) -> tuple[float, float]:
+    """Of time and MACs of solve and touches together."""
+    time = exponent(points, lambda p: p.whole_us)
+    return time, exponent(points, lambda p: p.macs + p.touch_macs)
 
 
 def as_text(result: GrowthTimes) -> str:

@@ -129,8 +129,7 @@ def add_growth(what: Any) -> None:
         "growth", help="time and MACs of a frame by pixels, rows, rank, touches and electrodes"
     )
     option(parser, "--rounds", default=15)
-    option(parser, "--cache DIR", "folder that keeps the models (default: a temporary one)", Path)
-    option(parser, "--picture PNG", "draw time and MACs", Path)
+    option(parser, "--cache DIR", "folder that keeps the models (default: out/growth)", Path)
     add_page_option(parser)
     parser.set_defaults(run=run_growth)
 
@@ -139,18 +138,16 @@ def run_growth(options: argparse.Namespace) -> int:
     """Time frames of growing models."""
     from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import growth as bench_growth
+    from eitskin_studies.harness.drawings import Drawing, draw_again, keep_drawings
+    from eitskin_studies.pictures.growth_picture import draw_growth
 
     check_within("--rounds", options.rounds, 1, 1000)
-    refuse_unwritable(options.page, options.picture)
-    if options.picture is not None:
-        from eitskin.view.panels import check_picture
-
-        check_picture(options.picture)
+    refuse_unwritable(options.page)
     result = bench_growth.run(options.rounds, options.cache, progress=progress_bar)
-    if options.picture is not None:
-        from eitskin_studies.pictures.growth_picture import draw_growth
-
-        draw_growth(options.picture, result)
+    if options.page is not None:
+        drawing = Drawing(draw_growth, bench_growth.drawn(result))
+        keep_drawings(options.page, {"pictures/growth.svg": drawing})
+        draw_again(options.page)
     command = f"eitskin bench growth --rounds {options.rounds}"
     filling = bench_growth.for_page(result, command)
     return show(options, result, bench_growth.as_text(result), filling)

@@ -36,8 +36,7 @@ OTHERS = {
     "board-cost": "bench board --scenes 180 --seed 1 --frames 12 --page {page}",
     "energy": "bench energy --page {results}/board-cost.md",
     "outputs": "bench outputs --taps 24 --seconds 20 --load 600 --seed 1 --page {page}",
-    "growth": "bench growth --rounds 21 --page {results}/benchmarks.md"
-    " --picture {pictures}/growth.png",
+    "growth": "bench growth --rounds 21 --page {results}/benchmarks.md",
 }
 
 
@@ -57,8 +56,7 @@ def commands() -> dict[str, list[str]]:
             words += ["--data", folder]
         found[name] = ["eitskin", *words]
     for name, text in OTHERS.items():
-        places = {"results": RESULTS, "pictures": f"{RESULTS}/pictures"}
-        whole = text.format(page=f"{RESULTS}/{name}.md", **places)
+        whole = text.format(page=f"{RESULTS}/{name}.md", results=RESULTS)
         found[name] = ["eitskin", *shlex.split(whole)]
     found["hard-cases"] = ["scripts/hard-cases"]
     return found

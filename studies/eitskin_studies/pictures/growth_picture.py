@@ -1,71 +1,54 @@
-"""How a frame's cost grows, as a picture: a panel for each thing that is varied."""
+"""How a frame's cost grows, as a picture: a column for each thing that is varied."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from eitskin.view.panels import save_picture
-from eitskin.view.pictures import INK, STYLE, load_matplotlib
-from eitskin_studies.benchmarks.growth import GrowthTimes, exponent
-from eitskin_studies.pictures.style import BLUE, GREY, VERMILION
+from eitskin_studies.pictures.style import (
+    BLUE,
+    VERMILION,
+    drawing,
+    legend_below,
+    plain_axes,
+    plain_ticks,
+)
 
-SOLVE, TOUCHES, MACS = BLUE, VERMILION, GREY
+PARTS = (("solve", "solve", BLUE, "o"), ("touches", "touches", VERMILION, "s"))
+TICKS_US, TICKS_KMAC = (10, 20, 50, 100, 200, 500, 1000), (10, 30, 100, 300, 1000, 3000)
 
 
-def draw_growth(path: str | Path, result: GrowthTimes) -> None:
-    """Microseconds of solve and touches (left axis) and multiply-accumulates (right axis) over what
-    is varied, as a PNG.
+def draw_growth(path: Path, data: Mapping[str, Any]) -> None:
+    """Time (above) and multiply-accumulates (below) of solve and touches over what is varied.
+    ``data`` has the ``sweeps``: name, label, values, exponents of ``time`` and ``macs``, and for
+    solve and touches the times in us and the thousand MACs.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
-    names = list(dict.fromkeys(point.sweep for point in result.points))
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(3.1 * len(names), 3.4), layout="constrained")
-        panels = figure.subplots(1, len(names), squeeze=False)
-        most = 1.25 * max(point.whole_us for point in result.points)
-        least = 0.7 * min(min(point.touch_us, point.solve_us) for point in result.points)
-        per_us = max(point.macs + point.touch_macs for point in result.points) / max(
-            point.whole_us for point in result.points
-        )
-        for number, (axes, name) in enumerate(zip(panels[0], names, strict=True)):
-            points = result.sweep(name)
-            values = [point.value for point in points]
-            axes.loglog(
-                values, [point.solve_us for point in points], "o-", color=SOLVE, label="solve, µs"
-            )
-            axes.loglog(
-                values,
-                [point.touch_us for point in points],
-                "s-",
-                color=TOUCHES,
-                label="touches, µs",
-            )
-            other = axes.twinx()
-            both = [point.macs + point.touch_macs for point in points]
-            other.loglog(values, both, ":", color=MACS, label="MACs of both (right)")
-            axes.set_ylim(least, most)
-            other.set_ylim(least * per_us, most * per_us)
-            axes.set_xticks(values, [str(value) for value in values])
-            axes.minorticks_off()
-            other.minorticks_off()
-            slope = exponent(points, lambda point: point.whole_us) if len(points) > 1 else 0.0
-            axes.set_title(f"{name}\ntime ~ value^{slope:.2f}", color=INK)
-            axes.set_xlabel(name.split(",")[0])
-            if number == 0:
-                axes.set_ylabel("µs per frame")
-                lines = [*axes.get_lines(), *other.get_lines()]
-                axes.legend(
-                    lines,
-                    [line.get_label() for line in lines],
-                    loc="upper left",
-                    frameon=False,
-                    fontsize=7,
-                )
-            if number == len(names) - 1:
-                other.set_ylabel("multiply-accumulates per frame")
-            else:
-                other.set_yticklabels([])
-            if number:
-                axes.set_yticklabels([])
-        save_picture(figure, path)
+    sweeps = data["sweeps"]
+    with drawing(path, 2.3 * len(sweeps) + 0.5, 5.4) as figure:
+        panels = figure.subplots(2, len(sweeps), sharex="col", sharey="row", squeeze=False)
+        for column, one in enumerate(sweeps):
+            for row, (kind, exponent) in enumerate((("us", "time"), ("kmac", "macs"))):
+                axes = panels[row, column]
+                for part, label, colour, marker in PARTS:
+                    axes.loglog(one["values"], one[f"{part}_{kind}"], color=colour, marker=marker,
+                                ms=4.5, label=label)  # fmt: skip
+                what = "time" if kind == "us" else "MACs"
+                axes.set_title(f"{what} ~ $x^{{{one[exponent]:.2f}}}$", fontsize=9)
+                plain_ticks(axes.xaxis, one["values"])
+                plain_axes(axes)
+            panels[1, column].set_xlabel(one["name"].replace(", ", "\n"))
+        for row, ticks, label in (
+            (panels[0], TICKS_US, "µs per frame on a host"),
+            (panels[1], TICKS_KMAC, "thousand MACs per frame"),
+        ):
+            low, high = row[0].get_ylim()
+            for axes in row:
+                plain_ticks(axes.yaxis, [tick for tick in ticks if low <= tick <= high])
+            row[0].set_ylabel(label)
+        legend_below(figure, panels[0, 0], 2)
+        figure.suptitle("How the cost of a frame grows with x, which the axis below names")

@@ -1,12 +1,10 @@
 """Single, double and triple touch by every method (the paper's Figs. 7 and 8), at fixed parameters
 and at each one's best."""
 
-from functools import partial
-
-from eitskin.fem.grid import grid_for
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
 from eitskin_studies.experiments.algorithms.candidates import candidates
+from eitskin_studies.experiments.algorithms.drawn import drawings
 from eitskin_studies.experiments.algorithms.measure import Field
 from eitskin_studies.experiments.algorithms.results import result_of
 from eitskin_studies.experiments.algorithms.tables import data, tables, words
@@ -24,18 +22,10 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         FileError: the workspace's folder cannot be written.
         GeometryError, MissingExtraError: from meshing and simulating.
     """
-    from eitskin_studies.pictures import algorithms_pictures as pictures
-
     count = workspace.settings.count
     field = Field(workspace, paper_skin(), adjacent(16), count(TUNING_SCENES), count(TEST_SCENES))
     results = [
         result_of(field, candidate) for candidate in workspace.progress(candidates(), "methods")
     ]
-    grid = grid_for(field.skin.outline)
-    drawn = {
-        "images.png": partial(pictures.draw_images, skin=field.skin, grid=grid, results=results),
-        "masks.png": partial(pictures.draw_masks, skin=field.skin, grid=grid, results=results),
-        "curves.png": partial(pictures.draw_curves, results=results),
-        "bars.png": partial(pictures.draw_bars, results=results),
-    }
+    drawn = drawings(results, workspace.settings.seed)
     return ExperimentOutcome(tables(results), data(field, results), drawn, words(field, results))

@@ -92,7 +92,9 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         for name in BASELINES
         for count, seed in workspace.progress(jobs, name)
     }
-    more = workspace.kept({"study": "teaching", "what": "more"}, partial(_more, presses, splits))
+    more = workspace.kept(
+        {"study": "teaching", "what": "more", "splits": splits}, partial(_more, presses, splits)
+    )
     changed = [(change, FIRST_SEED + k) for change in CHANGES for k in range(splits)]
     updated = {
         f"{change.text}/{seed}": workspace.kept(
