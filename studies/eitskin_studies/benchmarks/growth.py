@@ -291,9 +291,10 @@ def as_text(result: GrowthTimes) -> str:
 def for_page(result: GrowthTimes, command: str) -> Filling:
     """The marks ``growth-run`` and ``growth``."""
     run = (
-        f"By `{command}`: one thing varied at a time about 16 electrodes, 812 pixels, rank 64 and"
-        f" two touches; default options, cold, medians of {result.rounds} rounds in turns, {SCENES}"
-        f" frames each (linear answer, 60 dB); {result.machine}. Fitted exponents:"
+        f"By `{command}`: one size is varied at a time, the others are 16 electrodes, 812 pixels,"
+        f" rank 64 and two touches. Options are the defaults, and each frame is solved cold; times"
+        f" are medians of {result.rounds} rounds in turns over {SCENES} frames (seed {SEED}, the"
+        f" linear answer with noise at 60 dB); {result.machine}. Fitted exponents:"
         f" {summary(result)}."
     )
     return {"growth-run": run}, {"growth": (HEAD, rows(result))}
