@@ -68,7 +68,7 @@ def explain(name: str, seen: Sequence[int | None]) -> str:
         return f"electrodes of {name}: {listed}; look at their wires"
     if all(one is None for k, one in enumerate(seen) if k != 0):
         return f"{name} joins nothing: look at its EN and its supply"
-    return f"{name} joins other electrodes than it is told: look at its address lines"
+    return f"{name} joins other electrodes than the selected ones: check its address lines"
 
 
 def _exchanged(k: int, low: int, high: int) -> int:

@@ -28,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     how.add_argument(
         "--undo",
         action="store_true",
-        help="bring back the reference that the last tare replaced, where the board keeps it",
+        help="restore the reference that the last tare replaced, if the board has kept it",
     )
     parser.set_defaults(run=run)
 

@@ -70,7 +70,7 @@ def no_answer(link: Link, before: LinkCounters, what: str, waited_s: float) -> s
         at = f" at {baud} baud" if baud else ""
         return (
             f"{name}: {counters.bytes} bytes arrive but no packet decodes{at}: the baud rate is"
-            " another, or this is no eitskin board; give the rate with  serial:PORT?baud=N  or"
+            " wrong, or this is not an eitskin board; give the rate with  serial:PORT?baud=N  or"
             f" {FLASH}"
         )
     return (

@@ -280,7 +280,7 @@ def _placed(
     if protocol is None or options.keep_table:
         if (ours[:, 3] == GROUND).any():
             raise UsageError(
-                f"{where}: its rows are potentials; say of which pairs the differences are wanted:"
+                f"{where}: its rows are potentials; state the pairs whose differences are needed:"
                 " --skin FILE, or --protocol KIND --electrodes N"
             )
         each = np.arange(len(ours))

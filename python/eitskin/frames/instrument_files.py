@@ -179,7 +179,7 @@ def _numbers(line: str, where: str) -> FloatArray:
     try:
         values = np.array([float(word) for word in re.split(r"[\s,;]+", line)])
     except ValueError:
-        raise FrameError(f"{where}: {line[:40]!r} ... is no line of numbers; damaged") from None
+        raise FrameError(f"{where}: {line[:40]!r} ... is not a line of numbers; damaged") from None
     if len(values) % 2:
         raise FrameError(f"{where}: a line has {len(values)} numbers, which form no pairs; cut")
     return values

@@ -80,7 +80,7 @@ def paired(names: Sequence[str], values: AnyArray, how: str | None, option: str)
     if len(forms) > 1 or (forms and None in kinds):
         if how is None:
             raise UsageError(
-                f"{option}: the header does not say of every column what it is"
+                f"{option}: the header does not state the meaning of every column"
                 f" ({first_few(names, SHOWN)}); say --pairs {' | '.join(PAIRS)}"
             )
         forms = set()

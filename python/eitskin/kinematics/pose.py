@@ -58,8 +58,8 @@ def from_quaternion(xyz_m: Sequence[float], quaternion_xyzw: Sequence[float]) ->
     length = float(np.linalg.norm(quaternion_xyzw))
     if abs(length - 1) > NORM_SLACK:
         raise GeometryError(
-            f"quaternion_xyzw has the length {length:.4g}, so it is no rotation; its length must be"
-            " 1, and w is the last of the four numbers"
+            f"quaternion_xyzw has the length {length:.4g}, so it is not a rotation; its length"
+            " must be 1, and w is the last of the four numbers"
         )
     x, y, z, w = np.asarray(quaternion_xyzw, np.float64) / length
     rotation = [

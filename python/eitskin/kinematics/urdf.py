@@ -87,7 +87,7 @@ def _links(root: ElementTree.Element, names: list[str], path: str | Path) -> dic
             element = joint.find(end)
             link = None if element is None else element.get("link")
             if link not in names:
-                raise ConfigError(f"{where}: its {end} {link!r} is no link of this URDF")
+                raise ConfigError(f"{where}: its {end} {link!r} is not a link of this URDF")
             ends.append(link)
         parent, child = ends
         if child in joints:

@@ -376,7 +376,7 @@ def decode_sections(sections: Sections, protocol_hash: int, where: str) -> Model
     if protocol.hash != protocol_hash:
         _refuse(where, "a protocol table that does not fit its hash")
     if len(sections.get("SUMS", b"    ")) not in range(4, 2**32, 4):
-        _refuse(where, "section 'SUMS' of a size that is not that of checksums")
+        _refuse(where, "section 'SUMS' has the wrong size for checksums")
     name = STORAGES[d.storage]
     columns = np.frombuffer(sections["SENS"], dtype=DTYPES[name]).reshape(d.n_pixels, d.stride)
     if not np.isfinite(columns).all():

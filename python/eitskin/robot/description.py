@@ -156,7 +156,7 @@ def _skin(row: Mapping[str, Any], urdf: Urdf | None, folder: Path, where: str) -
     base = IDENTITY
     if urdf is not None:
         if link is None:
-            raise ConfigError(f"{where}: the key 'link' is required where the file names a URDF")
+            raise ConfigError(f"{where}: the key 'link' is required if the file names a URDF")
         if link not in urdf.links:
             raise ConfigError(f"{where}: link {link!r}: {nearest(link, urdf.links)}")
         base = urdf.links[link]

@@ -259,7 +259,7 @@ class Session:
             UsageError: it is no recording.
         """
         if self._replay is None:
-            raise UsageError(f"{self.name} is no recording: its time cannot be chosen")
+            raise UsageError(f"{self.name} is not a recording, so its time cannot be chosen")
         self._skip_us = round(1e6 * time_s)
         if self._skip_us < self._replay.last_us:
             self._read_again(Replay(self.settings.every or 1))

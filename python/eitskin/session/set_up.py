@@ -55,7 +55,7 @@ def wait_untouched(
         except SkinTouchedError as error:
             if time.monotonic() >= end_s:
                 raise SkinTouchedError(
-                    f"{error}; where nothing touches it, run  eitskin tare --anyway"
+                    f"{error}; if nothing touches it, run  eitskin tare --anyway"
                 ) from None
             if str(error) != said:
                 say(f"the reference waits: {error}")

@@ -48,7 +48,7 @@ def check_disk(points_mm: FloatArray, triangles: IntArray, where: str) -> None:
     if len(loops) > 1:
         raise GeometryError(
             f"{where}: it has {len(loops)} rims (lengths {', '.join(f'{x:.4g}' for x in loops)}"
-            " mm): a skin has no holes and is no open tube; close holes, cut a tube lengthwise"
+            " mm): a skin has no holes and is not an open tube; close holes, cut a tube lengthwise"
         )
     handles = 1 - len(np.unique(triangles)) + _count_edges(triangles) - len(triangles)
     if handles:

@@ -109,7 +109,7 @@ def _refuse_numbers(presses: Presses) -> None:
     for name in ("depth_mm", "force_n"):
         given = getattr(presses, name)
         if given is not None and not ((given >= 0) & (given <= 1e6) | np.isnan(given)).all():
-            raise FrameError(f"presses: {name} must be 0 to 1e6, or NaN where it is unknown")
+            raise FrameError(f"presses: {name} must be 0 to 1e6, or NaN if it is unknown")
     if presses.time_s is not None and not np.isfinite(presses.time_s).all():
         raise FrameError("presses: time_s has a number that is not finite; leave the array out")
 

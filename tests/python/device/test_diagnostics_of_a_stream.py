@@ -239,7 +239,7 @@ def test_what_fault_and_head_tell_is_said_once():
 
 def test_a_bridged_pair_is_said_once():
     events, both = Novelty(), (0xC0, 0, 0, 0, 0)
-    what_to_do = "water, paste or a wire joins them; dry or part them"
+    what_to_do = "water, paste or a wire joins them; dry or separate them"
     pair = {"diagnostics": bits("electrodes bridged"), "bridged_electrodes": (6, 7)}
     for reported, said in (
         (Fault(FaultCode.BRIDGED, True, 3, 6, 7, both),

@@ -83,13 +83,14 @@ FAULTS = {
     ),
     "a bridge": (
         FaultCode.BRIDGED, 5, 6,
-        "electrodes 5 and 6 bridged, frame 70: water, paste or a wire joins them; dry or part them",
+        "electrodes 5 and 6 bridged, frame 70: water, paste or a wire joins them; dry or"
+        " separate them",
         "electrode 5 bridged: over, frame 70",
     ),
     "a mismatch": (
         FaultCode.MODEL_MISMATCH, 0, 73,
-        "model mismatch 7.3 %, frame 70: no such sheet gives such voltages; check order, signs and"
-        " wiring (eitskin doctor)",
+        "model mismatch 7.3 %, frame 70: no change of this skin gives such voltages; check order,"
+        " signs and wiring (eitskin doctor)",
         "model mismatch: over, frame 70",
     ),
     "a late frame": (

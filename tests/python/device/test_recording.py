@@ -266,7 +266,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path):
 
 
 def test_a_full_disk_ends_the_recording_with_an_error():
-    with sim_device() as device, pytest.raises(FileError, match="what was recorded can be read"):
+    with sim_device() as device, pytest.raises(FileError, match="the part so far can be read"):
         Recorder("/dev/full", device, overwrite=True)
 
 

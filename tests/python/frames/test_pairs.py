@@ -85,7 +85,7 @@ def test_a_header_that_says_half_is_asked_for_the_rest(tmp_path):
         read(no_unit, complex_part="real", pairs="magnitude-radians"), Z.real, rtol=1e-9
     )
     half = pair_table(tmp_path / "h.csv", np.abs(Z), np.angle(Z), "R{0},theta{0}")
-    with pytest.raises(UsageError, match="the header does not say of every column what it is"):
+    with pytest.raises(UsageError, match="the header does not state the meaning of every column"):
         read(half, complex_part="abs")
 
 

@@ -162,7 +162,7 @@ def test_a_full_disk_ends_the_recording_alone(server, monkeypatch, tmp_path):
         name = session.recorder.path
 
         def full(self: RecordingFile, data: bytes) -> None:
-            raise FileError(f"{self.path}: cannot go on recording (No space left on device)")
+            raise FileError(f"{self.path}: cannot continue the recording (No space left on device)")
 
         monkeypatch.setattr(RecordingFile, "write", full)
         said: list[str] = []

@@ -115,7 +115,7 @@ SKIN = '[[skin]]\nname = "a"\ndevice = "sim:swipe"\n'
         (SKIN.replace("sim:swipe", "robot:b.toml"), "a robot cannot be the board of a skin"),
         (SKIN + "xyz_m = [0, 0]\n", "xyz_m must be a list of 3 numbers"),
         (SKIN + 'xyz_m = [0, 0, "a"]\n', "xyz_m must be a number"),
-        (SKIN + "quaternion_xyzw = [1, 1, 0, 0]\n", "it is no rotation"),
+        (SKIN + "quaternion_xyzw = [1, 1, 0, 0]\n", "it is not a rotation"),
         (SKIN + "quaternion_xyzw = [0, 0, 0, 1]\nrpy_rad = [0, 0, 0]\n", "leave one out"),
         (SKIN + 'link = "a b"\n', "cannot be a frame"),
         (
@@ -147,7 +147,7 @@ def test_what_is_wrong_with_a_robot_file(text, message, tmp_path, capsys):
         ("<robot", "<arm", "not valid XML"),
         ('"arm">', '"arm"><!DOCTYPE x>', "document type"),
         ('"arm">', '"arm"><xacro:x/>', "is a xacro file"),
-        ('<link name="upper"/>', "", "'upper' is no link"),
+        ('<link name="upper"/>', "", "'upper' is not a link"),
         ('<link name="upper"/>', '<link name="hand"/>', "comes twice"),
         ('<child link="hand"/>', '<child link="upper"/>', "has two parents"),
         ('<parent link="base"/>', '<parent link="hand"/>', "form a circle"),

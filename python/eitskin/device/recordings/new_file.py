@@ -77,14 +77,15 @@ class RecordingFile:
             written = self._file.write(data)
         except (OSError, ValueError) as error:
             raise FileError(
-                f"{self._path}: cannot go on recording ({error}); what was recorded can be read"
+                f"{self._path}: cannot continue the recording ({error});"
+                " the part so far can be read"
             ) from None
         if written != len(data):
             with suppress(OSError):  # what is no regular file has no end to cut
                 self._file.truncate(self._file.seek(-written, os.SEEK_CUR))
             raise FileError(
-                f"{self._path}: cannot go on recording (No space left on device); what was recorded"
-                " can be read"
+                f"{self._path}: cannot continue the recording (No space left on device);"
+                " the part so far can be read"
             )
 
     @property

@@ -246,7 +246,7 @@ def recorded_options(path: str | Path) -> Options | None:
                 check_options(options)
             except (TypeError, EitskinError) as error:
                 raise FileError(
-                    f"{path}: what it notes of the solver cannot be ({error}); record again"
+                    f"{path}: its note on the solver is not valid ({error}); record again"
                 ) from None
             return options
     return None

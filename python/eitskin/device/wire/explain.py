@@ -148,10 +148,10 @@ def found_name(fault: Fault) -> str:
 _FOUND = {
     FaultCode.ELECTRODE_OPEN: "it makes no contact; wet or press it, then tare",
     FaultCode.SATURATED: "beyond the converter's range; lower the gain or the current",
-    FaultCode.BRIDGED: "water, paste or a wire joins them; dry or part them",
-    FaultCode.ELECTRODE_NOISY: "a loose contact or wire; press it, or see to its wire",
+    FaultCode.BRIDGED: "water, paste or a wire joins them; dry or separate them",
+    FaultCode.ELECTRODE_NOISY: "a loose contact or wire; press it, or check its wire",
     FaultCode.MODEL_MISMATCH: (
-        "no such sheet gives such voltages; check order, signs and wiring (eitskin doctor)"
+        "no change of this skin gives such voltages; check order, signs and wiring (eitskin doctor)"
     ),
     FaultCode.STALE_REFERENCE: (
         "the skin was touched while it was taken, or has changed since; leave it untouched and run"

@@ -116,7 +116,7 @@ def _made(kind: type[AnyPayload], values: Sequence[Any], what: str) -> AnyPayloa
     """The payload whose values on the wire are ``values``."""
     layout, found = kind.LAYOUT, {}
     if not all(map(isfinite, [values[place] for place in layout.reals])):
-        raise MalformedPacket(f"{what}: a value that is no number")
+        raise MalformedPacket(f"{what}: a value that is not a number")
     for name, form, start, end in layout.places:
         found[name] = FORMS[form].read(values[start:end]) if form else values[start]
     return kind(**found)
@@ -165,7 +165,7 @@ def parse_image(payload: bytes) -> SolvedImage:
     _check_rest(payload, solved, 4 * solved.count, "IMAGE")
     image = np.frombuffer(payload, dtype="<f4", offset=solved.LAYOUT.size)
     if not np.isfinite(image).all():
-        raise MalformedPacket("IMAGE: a pixel that is no number")
+        raise MalformedPacket("IMAGE: a pixel that is not a number")
     return SolvedImage(solved, image)
 
 
@@ -180,7 +180,7 @@ def parse_touches(payload: bytes) -> SolvedTouches:
         _check_rest(payload, solved, each.size * solved.count, "TOUCHES")
     found = list(each.struct.iter_unpack(rest))
     if not all(map(isfinite, (value for one in found for value in one))):
-        raise MalformedPacket("TOUCHES: a value that is no number")
+        raise MalformedPacket("TOUCHES: a value that is not a number")
     return SolvedTouches(solved, tuple(map(known_touch, found)))
 
 

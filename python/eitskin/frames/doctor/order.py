@@ -169,7 +169,7 @@ def check_sign(case: Case) -> tuple[Case, CheckOutcome]:
         else:
             text = (
                 "all voltages are above 0 where the homogeneous frame is below 0: reversed polarity"
-                " or magnitudes; no row crosses 0, so they cannot be told apart, and both"
+                " or magnitudes; no row crosses 0, so they cannot be distinguished, and both"
                 " options repair it alike"
             )
             finding = Finding("reversed-or-magnitude", FAULT, text, evidence, "--sign reversed")

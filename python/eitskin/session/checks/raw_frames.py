@@ -102,9 +102,7 @@ def as_frames(
 ) -> Frames:
     """The frames, named by their numbers on the board and timed by its clock."""
     if not untouched:
-        raise FrameError(
-            "there is no untouched frame, and images are made of what differs from them"
-        )
+        raise FrameError("there is no untouched frame, and images show the differences from these")
     rows = protocol.n_rows
     start = (frames[0] if frames else untouched[0]).time_us
     skin = {} if known is None else {"skin": skin_to_table(known.model.skin)}
