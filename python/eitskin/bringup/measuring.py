@@ -10,7 +10,7 @@ from eitskin.device.client import Device
 from eitskin.device.wire.packets import ProbedBurst
 
 Row = tuple[int, int, int, int]
-LEAST_V = 0.004  # five codes: less is no signal
+LEAST_V = 0.004  # five codes; a smaller amplitude is not a signal
 
 
 @dataclass(frozen=True)

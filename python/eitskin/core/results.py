@@ -170,9 +170,9 @@ def known_touch(values: Sequence[Any]) -> Touch:
         whole[first] = None
     if not whole[first + 1]:
         whole[first + 1 :] = [None] * (len(whole) - first - 1)
-    if not any(whole[-3:-1]):  # no long axis: a disc, as far as the data tell
+    if not any(whole[-3:-1]):  # no long axis: the data do not distinguish it from a disc
         whole[-3:-1] = [None, None]
-    if not whole[-1]:  # the data do not tell the radius
+    if not whole[-1]:  # the data do not determine the radius
         whole[-1] = None
     return replace(Touch(*whole), confirmed=bool(confirmed))
 

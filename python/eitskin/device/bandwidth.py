@@ -16,7 +16,7 @@ from eitskin.device.wire.link_table import (
 from eitskin.device.wire.packets import BoardInfo
 
 BITS_A_BYTE = 10  # start, eight, stop
-USED = 0.9  # of the line; the rest is for replies, faults and what comes in bursts
+USED = 0.9  # of the line; the rest is for replies, faults and bursts
 PACKET_BYTES = 16  # head, checksum, zeros and stuffing
 ROW_BYTES = 4 + 1  # the voltage and the quality
 PIXEL_BYTES = 4

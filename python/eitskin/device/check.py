@@ -16,7 +16,7 @@ from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.skin.protocol import Protocol, pattern, pattern_name, pattern_names
 
-MIXED_ELECTRODES = 32  # up to so many, drive and measuring patterns that differ are tried too
+MIXED_ELECTRODES = 32  # up to this number, different drive and measuring patterns are also tried
 
 FLASH = "flash this version's firmware with  eitskin flash"
 

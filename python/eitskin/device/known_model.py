@@ -70,8 +70,8 @@ def scanned_protocol(info: BoardInfo, known: KnownModel | None, name: str) -> Pr
     if protocol is not None:
         return protocol
     raise DeviceError(
-        f"{name}: which rows the board scans (protocol {info.protocol_hash:016x}) only its model"
-        f" tells; {NAMES_IT}"
+        f"{name}: only the board's model shows which rows it scans (protocol"
+        f" {info.protocol_hash:016x}); {NAMES_IT}"
     )
 
 

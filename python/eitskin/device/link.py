@@ -42,7 +42,7 @@ ANSWERS = 64  # that nobody waits for; older ones are forgotten
 USELESS = 10_000  # packets in a row that are neither streamed nor answers
 READ_S = 0.1
 CLOSE_S = 0.5  # that letting go of a port may take
-KEEPALIVE_S = 0.25  # a board lets no current flow where it hears nothing for a second
+KEEPALIVE_S = 0.25  # a board switches the current off if it receives nothing for a second
 KEEPALIVE = Keepalive(1).payload(0)
 PACKET_S = 1e-3  # no packet takes less of a board's own time
 

@@ -3,7 +3,7 @@
 import threading
 import time
 
-MAX_BEHIND_S = 0.25  # further behind, what is lost is not caught up
+MAX_BEHIND_S = 0.25  # beyond this delay, the lost time is not caught up
 
 
 class WallClock:

@@ -172,7 +172,7 @@ def open_port(path: str, baud: int) -> Any:
         if code not in (errno.ENOTTY, errno.EINVAL, errno.EISDIR, None):
             raise _NotNow(f"{path}: cannot open it ({_reason(error)})") from None
         reason = _reason(error)
-    except Exception as error:  # termios.error, which is no OSError
+    except Exception as error:  # termios.error, which is not an OSError
         reason = _reason(error)
     raise DeviceError(
         f"{path}: no serial port that does {baud} baud ({reason}); see  eitskin devices"

@@ -26,7 +26,7 @@ from eitskin.threads import FairLock
 
 GROUP = "eitskin.sources"
 POLL_S = 0.02
-PERIOD_US = 20_000  # where nothing else is known
+PERIOD_US = 20_000  # if nothing else is known
 MAX_GAP_S = 60.0
 SILENT_S, SILENT_PERIODS = 1.0, 4  # until it is a fault that no frame comes
 LOOKED_AT = 4  # frames of a tare that show which rows cannot be used

@@ -89,7 +89,7 @@ class ReadText:
     columns: tuple[int, ...]
     pairs: str | None
     time: int | None
-    one_delimiter: bool = True  # all files have that of ``form``
+    one_delimiter: bool = True  # the same for all files: that of ``form``
 
 
 @dataclass(frozen=True, eq=False)

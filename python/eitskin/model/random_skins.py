@@ -52,7 +52,9 @@ class Request:
     projection: FloatArray
     grid: Grid
     uncertainty: Uncertainty
-    fits_jointly: bool = False  # whether the model has what the joint fit of touches needs
+    fits_jointly: bool = (
+        False  # whether the model fulfils the conditions of the joint fit of touches
+    )
 
 
 def sensitivity_of(

@@ -228,7 +228,7 @@ class OracleEngine:
         y = project @ (white.data @ folded.d)
         whole = white.ignored.shape[1] > 0 or folded.known.all() or self.model.row_form is None
         most = len(y) if whole else min(len(y), int(folded.known.sum()))
-        if count >= most:  # no direction is left: what is there is rounding
+        if count >= most:  # no direction is left: the numbers are rounding errors
             y = np.zeros_like(y)
         return Explained(y, project @ white.seen, project, unusable, folded, white, found)
 

@@ -246,7 +246,7 @@ class PageCommands:
                 return done or "nothing is being recorded"
             path = _free(folder / f"{name}.eits")
 
-            def failed(error: FileError) -> None:  # the disk is full: the view goes on
+            def failed(error: FileError) -> None:  # the disk is full: the view continues
                 self._failed(error)
                 self._changed(session, lambda device: self._end_recording(session))
 

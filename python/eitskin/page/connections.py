@@ -8,7 +8,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 HEAD_S = 5.0  # that a request's head may take
-MAX_CONNECTIONS = 128  # then the oldest one that has not said what it wants is cut
+MAX_CONNECTIONS = 128  # then the oldest connection without a request is closed
 MAX_UNREAD = 4 << 20  # bytes that wait for a page to read them
 
 

@@ -176,7 +176,7 @@ class SessionReader:
         self.report("notice", notice.message())
         kind = notice.cause.kind if isinstance(notice.cause, LinkEvent) else ""
         if len(self.live().parts) > 1:
-            return  # of a robot, whose other skins go on
+            return  # of a robot, whose other skins continue
         if kind == "unplugged":
             self._set("unplugged", "the board is gone; waiting until it is plugged in again")
         elif kind == "reconnected":

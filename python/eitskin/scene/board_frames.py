@@ -11,7 +11,7 @@ from eitskin.scene.description import Scene
 from eitskin.scene.random_touches import TrueTouch
 from eitskin.skin.protocol import Protocol, in_order, table
 
-# A scene with up to so many frames, untouched ones included, is simulated at once.
+# A scene with up to this number of frames, untouched ones included, is simulated at once.
 WHOLE_FRAMES = 512
 WINDOW_FRAMES = 64  # frames of a longer scene that are compiled together and made one at a time
 SAME_S = 1e-7  # rows within this time of a frame's own rows count as the same

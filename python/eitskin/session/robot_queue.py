@@ -48,7 +48,7 @@ class Lane:
             if self.timed and not isinstance(message, Notice):
                 first = (message.time_us, 0)
             self._waiting.append((first, message))
-            if len(self._waiting) == 1:  # nothing else lets the reader go on
+            if len(self._waiting) == 1:  # nothing else lets the reader continue
                 queue.changed.notify()
         return not queue.ending.is_set()
 

@@ -119,11 +119,11 @@ class Session:
         self._novelty = Novelty()
         self._last_s: float | None = None  # of the last frame
         self._replay: Replay | None = None
-        self._skip_us: int | None = None  # what comes before is not shown
+        self._skip_us: int | None = None  # messages before it are not shown
         self._requests = Requests()
         self._stopping, self._started, self._every = threading.Event(), False, 1
         self._starting = threading.RLock()
-        self._answers_s = STOP_S  # that the board may take to say what it counted
+        self._answers_s = STOP_S  # limit for the board to send its counters
         self._reading = OneReader("the messages of this session", OTHERS)
 
     def __enter__(self) -> "Session":
@@ -289,7 +289,7 @@ class Session:
             raise
         self.solver = set_up(self.device, scan, solver, self.known)
 
-    # ---- what comes ----
+    # ---- messages ----
 
     def messages(self) -> Generator[Message, None, None]:
         """Yield frames, reports after drives if the settings ask for them, and notices of news,
@@ -348,7 +348,7 @@ class Session:
             what |= Stream.DRIVE_TOUCHES
         if self.replays:
             if what & Stream.EVENTS:
-                what |= Stream.TOUCHES  # of which gestures are made where none were recorded
+                what |= Stream.TOUCHES  # gestures are made from these touches if none were recorded
             self._packets = packet_stream(self.device, what, 1, 0)
         else:
             limited = how.frames and how.report == "frame"

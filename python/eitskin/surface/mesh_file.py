@@ -19,7 +19,7 @@ MIN_TRIANGLES = 20
 MIN_MM, MAX_MM = 5.0, 5000.0
 MERGE = 1e-6  # vertices closer than this part of the surface's size are one
 UNITS_MM = {"mm": 1.0, "m": 1000.0}
-# What to do about a surface that is a skin's size if its numbers are multiplied by the key.
+# The remedy for a surface that has a skin's size if its numbers are multiplied by the key.
 UNIT_HINTS = {
     "mm": {1e3: 'its numbers seem to be in m: write surface_unit = "m"'},
     "m": {1e-3: 'its numbers seem to be in mm: write surface_unit = "mm"'},

@@ -18,7 +18,7 @@ from eitskin.core.diagnostics_table import Touch
 from eitskin.surface.locate import Locator, nearest_on_segments, nearest_on_triangles
 from eitskin.surface.topology import rim_loop
 
-EXPECTED_RADIUS_SD = 0.3  # of the radius that a touch is given where the data do not tell it
+EXPECTED_RADIUS_SD = 0.3  # of a touch's radius if the data do not determine it
 
 
 class LocatedTouch(Protocol):
@@ -178,7 +178,7 @@ class SurfaceMap:
         growth = self.growth_per_mm(centre)[0]
         shift = 0.5 * touch.radius_mm**2 * growth
         length = float(np.hypot(*shift))
-        if length > 0.5 * touch.radius_mm:  # beyond what the formula is good for
+        if length > 0.5 * touch.radius_mm:  # beyond the range of the formula
             shift *= 0.5 * touch.radius_mm / length
         place = self.at(centre + shift)
         tangents, scale = place.tangents[0], float(place.scale[0])

@@ -64,7 +64,7 @@ def test_protocols_that_need_no_model():
         electrodes, rows = protocol.n_electrodes, protocol.n_rows
         board = info(model_crc=1, protocol_hash=protocol.hash, n_electrodes=electrodes, n_rows=rows)
         assert scanned_protocol(board, None, "x").hash == protocol.hash
-    with pytest.raises(DeviceError, match="only its model tells; name its file with"):
+    with pytest.raises(DeviceError, match="only the board's model shows which rows"):
         scanned_protocol(info(model_crc=1, protocol_hash=1), None, "x")
     found = scanned_protocol(info(protocol_hash=1), KnownModel(*prebuilt()), "x").hash
     assert found == prebuilt()[0].protocol.hash

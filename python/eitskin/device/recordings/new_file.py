@@ -81,7 +81,7 @@ class RecordingFile:
                 " the part so far can be read"
             ) from None
         if written != len(data):
-            with suppress(OSError):  # what is no regular file has no end to cut
+            with suppress(OSError):  # only a regular file has an end to cut
                 self._file.truncate(self._file.seek(-written, os.SEEK_CUR))
             raise FileError(
                 f"{self._path}: cannot continue the recording (No space left on device);"
@@ -108,7 +108,7 @@ class RecordingFile:
             self._syncing.start()
 
     def _sync(self) -> None:
-        with suppress(OSError, ValueError):  # what is no regular file has no disk
+        with suppress(OSError, ValueError):  # only a regular file is on a disk
             os.fsync(self._file.fileno())
 
     def close(self) -> None:

@@ -36,7 +36,7 @@ DOUBTFUL_FAULTS = frozenset(  # rise after RAISE_FRAMES
     FaultCode[name]
     for name in ("ELECTRODE_NOISY", "MODEL_MISMATCH", "STALE_REFERENCE", "UNLIKE_MODEL")
 )
-# faults that frames show, and that go after CLEAR_FRAMES; of those of an electrode each has its own
+# faults that frames show and CLEAR_FRAMES frames clear; each electrode has its own faults
 FOUND_FAULTS = ELECTRODE_FAULTS | DOUBTFUL_FAULTS | {FaultCode.SATURATED}
 
 

@@ -173,7 +173,7 @@ def parse_touches(payload: bytes) -> SolvedTouches:
     solved, each = unpack(Solved, payload, "TOUCHES", more=True), TouchPacket.LAYOUT
     rest = payload[solved.LAYOUT.size :]
     if solved.count > 0 and len(rest) == OLDEST_TOUCH_BYTES * solved.count:
-        # of a board that does not tell deviations of radii; all its touches are of whole frames
+        # from a board that does not send deviations of radii; its touches are those of whole frames
         confirmed = (1).to_bytes(4, "little")
         rest = _grown(rest, OLDEST_TOUCH_BYTES, each.size - len(confirmed), confirmed)
     else:

@@ -18,7 +18,7 @@ from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 from eitskin.frames.orders import source_table
 from eitskin.skin.protocol import Protocol, pattern, pattern_name, pattern_names
 
-MIXED_ELECTRODES = 32  # up to so many, drive and measuring patterns that differ are tried too
+MIXED_ELECTRODES = 32  # up to this number, different drive and measuring patterns are also tried
 SHOWN = 3
 CLOSER = 4.0
 NEAR_ENOUGH = 0.99  # above this correlation no other pattern is tried
