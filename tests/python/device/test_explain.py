@@ -211,7 +211,7 @@ def test_usual_protocols_are_known_without_a_model(protocol):
 
 def test_another_protocol_needs_the_model():
     with pytest.raises(
-        DeviceError, match="only the board's model shows .* name its file with  --model FILE"
+        DeviceError, match=r"only the board's model shows .* name its file with  --model FILE"
     ):
         scanned_protocol(board_info(), None, "port")
 
