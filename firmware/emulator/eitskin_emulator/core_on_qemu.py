@@ -165,6 +165,7 @@ def build_cortex_m7(source: Path, build: Path, *targets: str) -> Path:
         "-DCMAKE_BUILD_TYPE=Release",
     ]
     configure += [f"-DCMAKE_TOOLCHAIN_FILE={toolchain}", "-DEITSKIN_TESTS=OFF"]
+    configure += ["-DEITSKIN_WERROR=ON"]  # as in the preset: nothing is compiled again for scripts
     chosen = [word for target in targets for word in ("--target", target)]
     for command in (configure, ["cmake", "--build", str(build), *chosen]):
         done = subprocess.run(command, capture_output=True, text=True, check=False)

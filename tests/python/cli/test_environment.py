@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from eitskin.cli.main import main
 from fresh_python import MAIN, run_python
 
 RC = (
@@ -32,8 +33,16 @@ SETTINGS = {
 }
 COMMANDS = [
     ["demo", "--picture", "{folder}/demo.png"],
-    ["stream", "--device", "sim:swipe", "--frames", "3", "--picture", "{folder}/stream.png"],
+    # a simulated skin would be meshed and solved in each process
+    ["stream", "--device", "file:{recorded}", "--picture", "{folder}/stream.png"],
 ]
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory) -> Path:
+    path: Path = tmp_path_factory.mktemp("recorded") / "swipe.eits"
+    assert main(["record", "--device", "sim:swipe", "--frames", "3", "-o", str(path)]) == 0
+    return path
 
 
 def run(folder: Path, command: list[str], setting: dict[str, str]) -> subprocess.CompletedProcess:
@@ -50,15 +59,21 @@ def run(folder: Path, command: list[str], setting: dict[str, str]) -> subprocess
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory) -> Callable[[int], tuple[bytes, bytes]]:
-    """The output and the picture of a command of COMMANDS without such settings."""
+def commands(recorded) -> list[list[str]]:
+    """COMMANDS with the recording's path."""
+    return [[one.replace("{recorded}", str(recorded)) for one in words] for words in COMMANDS]
+
+
+@pytest.fixture(scope="module")
+def plain(commands, tmp_path_factory) -> Callable[[int], tuple[bytes, bytes]]:
+    """The output and the picture of one of ``commands`` without such settings."""
 
     @cache
     def of(number: int) -> tuple[bytes, bytes]:
         folder = tmp_path_factory.mktemp("plain")
-        done = run(folder, COMMANDS[number], {})
+        done = run(folder, commands[number], {})
         assert done.returncode == 0, done
-        picture = Path(COMMANDS[number][-1].replace("{folder}", str(folder)))
+        picture = Path(commands[number][-1].replace("{folder}", str(folder)))
         return lines(done.stdout), picture.read_bytes()
 
     return of
@@ -83,12 +98,12 @@ SHORT = ("a notebook's backend", "a locale with a decimal comma", "no home")
         for name in SETTINGS
     ],
 )
-def test_it_does_and_draws_the_same(name, plain, tmp_path):
+def test_it_does_and_draws_the_same(name, commands, plain, tmp_path):
     (tmp_path / "rc").write_text(RC)
     if name == "a matplotlibrc":
         (tmp_path / "matplotlibrc").write_text(RC)
     for number in (0, 1) if name == "a matplotlibrc" else (1,):
-        command, expected = COMMANDS[number], plain(number)
+        command, expected = commands[number], plain(number)
         done = run(tmp_path, command, SETTINGS[name])
         assert done.returncode == 0, done.stderr.decode()
         assert b"Traceback" not in done.stderr and b"Warning" not in done.stderr, done.stderr

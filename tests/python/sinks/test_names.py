@@ -18,6 +18,7 @@ from eitskin.device.wire.link_table import Setting
 from eitskin.errors import UsageError
 from eitskin.session.message import schema
 from eitskin.session.session import Session
+from eitskin.session.settings import SessionSettings
 from eitskin.sinks.mqtt import open_sink as open_mqtt
 from eitskin.sinks.outputs import Outputs, open_sink
 from eitskin.sinks.sink import TouchSource
@@ -151,6 +152,16 @@ def sources(datagrams: list[bytes]) -> set[str]:
     return found
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory) -> Path:
+    """Frames for programs: a simulated skin would be meshed and solved in each of them."""
+    path: Path = tmp_path_factory.mktemp("recorded") / "swipe.eits"
+    with Session("sim:swipe", SessionSettings(frames=3, record=path)) as session:
+        for _ in session.messages():
+            pass
+    return path
+
+
 @pytest.mark.parametrize(
     ("names", "expected"),
     [
@@ -159,13 +170,13 @@ def sources(datagrams: list[bytes]) -> set[str]:
         (["", ""], ["eitskin-", "eitskin-"]),
     ],
 )
-def test_two_skins_on_one_tuio_port_are_two_sources(names, expected):
-    """Two processes, with the same scene."""
+def test_two_skins_on_one_tuio_port_are_two_sources(names, expected, recorded):
+    """Two processes, with the same recording."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
         line.bind(("127.0.0.1", 0))
         line.settimeout(0.2)
         to = f"tuio://127.0.0.1:{line.getsockname()[1]}"
-        command = [sys.executable, "-m", "eitskin", "stream", "--device", "sim:swipe"]
+        command = [sys.executable, "-m", "eitskin", "stream", "--device", f"file:{recorded}"]
         programs = []
         for one in names:
             path = one.removeprefix("--to=") if one.startswith("--to") else ""

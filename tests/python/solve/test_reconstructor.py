@@ -250,7 +250,9 @@ def test_bad_options_are_named_and_the_old_ones_stay(engine):
             reconstructor.set_options(**changes)
         assert text in one_line(error)
         assert reconstructor.options == before, changes
-        assert reconstructor.reconstruct(session().frames_v[0]).info.iterations == 7, changes
+        if engine == "c":  # there the core has options of its own
+            assert reconstructor.reconstruct(session().frames_v[0]).info.iterations == 7, changes
+    assert reconstructor.reconstruct(session().frames_v[0]).info.iterations == 7
 
 
 def test_the_core_refuses_them_by_itself():
