@@ -12,8 +12,8 @@ import numpy as np
 from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.fem.grid import grid_for
 from eitskin.skin.skin import Skin
-from eitskin.view.panels import draw_panels, save_picture
-from eitskin.view.pictures import INK, STYLE, Mark, Panel, load_matplotlib
+from eitskin.view.panels import draw_panels
+from eitskin.view.pictures import INK, Mark, Panel
 from eitskin_studies.experiments.multitouch.ambiguity import ScoredFrame
 from eitskin_studies.experiments.multitouch.ambiguity_tables import found_some, reliabilities
 from eitskin_studies.experiments.multitouch.cells import GEOMETRIES, MAX, MIN, NARROW, RING, WIDE
@@ -31,12 +31,15 @@ from eitskin_studies.pictures.style import (
     PURPLE,
     SNR_COLOURS,
     VERMILION,
+    drawing,
+    legend_below,
+    plain_axes,
 )
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-CLASSICAL_COLOURS = (GREY, BLACK, PURPLE)
+CLASSICAL_COLOURS, CLASSICAL_MARKERS = (GREY, BLACK, PURPLE), ("s", "^", "D")
 TITLES = {RING: "ring of 60 mm", WIDE: "random, 4 radii apart", NARROW: "random, 2.5 radii apart"}
 NEAREST_EDGES = (0.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.5, 20.0)
 REPORTED, NOT_REPORTED = VERMILION, BLUE
@@ -50,50 +53,52 @@ def draw_counts(path: str | Path, counted: CountedScenes) -> None:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(
-            figsize=(11.5, 3.3 * len(NAMES) + 0.5), layout="constrained"
-        )
-        for row, variant in enumerate(NAMES):
+    with drawing(path, 10.5, 2.9 * len(NAMES) + 0.5) as figure:
+        panels = figure.subplots(len(NAMES), len(GEOMETRIES), sharex=True, sharey=True)
+        for row, variant in zip(panels, NAMES, strict=True):
             lines = [
-                (variant, snr_db, SNR_COLOURS[snr_db], f"core, {snr_db:g} dB") for snr_db in SNRS_DB
+                (variant, snr_db, SNR_COLOURS[snr_db], "o", f"core, {snr_db:g} dB")
+                for snr_db in SNRS_DB
             ]
-            lines += [(name, HEADLINE_DB, colour, f"{SHORT.get(name, name)}, {HEADLINE_DB:g} dB")
-                      for name,
-                      colour in zip(CLASSICAL, CLASSICAL_COLOURS, strict=True)]  # fmt: skip
-            for column, geometry in enumerate(GEOMETRIES):
-                axes = figure.add_subplot(len(NAMES), 3, 3 * row + column + 1)
-                for place, (name, snr_db, colour, label) in enumerate(lines):
-                    points = [(k, counted.scores[geometry, k, name, snr_db]) for k in range(MIN,
-                        MAX + 1)
-                              if (geometry, k, name, snr_db) in counted.scores]  # fmt: skip
-                    if points:
-                        _line(axes, points, (place - len(lines) / 2) * 0.06, colour, label)
-                axes.set(
-                    xlabel="touches" if row == len(NAMES) - 1 else "",
-                    ylim=(-0.03, 1.12),
-                    xticks=range(MIN, MAX + 1),
+            lines += [
+                (name, HEADLINE_DB, colour, marker, f"{SHORT.get(name, name)}, {HEADLINE_DB:g} dB")
+                for name, colour, marker in zip(
+                    CLASSICAL, CLASSICAL_COLOURS, CLASSICAL_MARKERS, strict=True
                 )
-                axes.set_title(f"{variant}: {TITLES[geometry]}")
-                axes.grid(linewidth=0.4, alpha=0.5)
-                if column == 0:
-                    axes.set_ylabel("share of scenes counted exactly")
-        handles, labels = axes.get_legend_handles_labels()
-        figure.legend(
-            handles, labels, loc="outside lower center", ncols=6, frameon=False, fontsize=8
-        )
-        save_picture(figure, path)
+            ]
+            for axes, geometry in zip(row, GEOMETRIES, strict=True):
+                for place, (name, snr_db, colour, marker, label) in enumerate(lines):
+                    points = [
+                        (k, counted.scores[geometry, k, name, snr_db])
+                        for k in range(MIN, MAX + 1)
+                        if (geometry, k, name, snr_db) in counted.scores
+                    ]
+                    if points:
+                        shift = (place - len(lines) / 2) * 0.06
+                        _line(axes, points, shift, colour, marker, label)
+                axes.set(ylim=(-3, 105), xticks=range(MIN, MAX + 1))
+                axes.set_title(f"{variant}: {TITLES[geometry]}", fontsize=9)
+                axes.tick_params(labelbottom=True)
+                plain_axes(axes)
+            row[0].set_ylabel("scenes counted exactly, %")
+        for axes in panels[-1]:
+            axes.set_xlabel("touches")
+        legend_below(figure, panels[0, 0], 6)
 
 
 def _line(
-    axes: Axes, points: Sequence[tuple[int, Score]], shift: float, colour: str, label: str
+    axes: Axes,
+    points: Sequence[tuple[int, Score]],
+    shift: float,
+    colour: str,
+    marker: str,
+    label: str,
 ) -> None:
-    exact = [score.exact for _, score in points]
-    mean, errors = _means(exact)
+    """Shares in %, with their intervals, side by side."""
+    mean, errors = (100 * values for values in _means([score.exact for _, score in points]))
     x = np.array([k for k, _ in points]) + shift
     axes.errorbar(
-        x, mean, errors, color=colour, marker="o", label=label, elinewidth=0.7, capsize=1.5,
+        x, mean, errors, color=colour, marker=marker, label=label, elinewidth=0.7, capsize=1.5,
         linewidth=1.3, markersize=3,
     )  # fmt: skip
 
@@ -151,14 +156,12 @@ def draw_ambiguity(path: str | Path, ambiguities: Ambiguities) -> None:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
     frames = ambiguities.mixed[NAMES[0]]
     says = {
         "crowded": np.array([f.said for f in frames], dtype=np.bool_),
         "score": ambiguities.rule.says(frames),
     }
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(11.5, 6.8), layout="constrained")
+    with drawing(path, 11.5, 6.8) as figure:
         for row, (signal, said) in enumerate(says.items()):
             for column, (title, ticks, group) in enumerate(_groupings(frames)):
                 axes = figure.add_subplot(2, 4, 4 * row + column + 1)
@@ -175,7 +178,8 @@ def draw_ambiguity(path: str | Path, ambiguities: Ambiguities) -> None:
         _chances(axes, ambiguities)
         axes = figure.add_subplot(2, 4, 8)
         _trade(axes, ambiguities)
-        save_picture(figure, path)
+        for axes in figure.axes:
+            plain_axes(axes)
 
 
 def _groupings(frames: Sequence[ScoredFrame]) -> list[tuple[str, list[str], IntArray]]:
@@ -288,11 +292,9 @@ def draw_touch_scores(path: str | Path, ambiguities: Ambiguities) -> None:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(figsize=(3.9 * len(NAMES), 4.4), layout="constrained")
-        for number, name in enumerate(NAMES):
-            axes = figure.add_subplot(1, len(NAMES), number + 1)
+    with drawing(path, 3.6 * len(NAMES), 4.4) as figure:
+        panels = figure.subplots(1, len(NAMES), sharey=True)
+        for axes, name in zip(panels, NAMES, strict=True):
             one = ambiguities.touches[name]
             named = (
                 ("explained", one.explained),
@@ -301,25 +303,11 @@ def draw_touch_scores(path: str | Path, ambiguities: Ambiguities) -> None:
             )
             for (text, values), colour in zip(named, COLOURS, strict=False):
                 false, true = roc(values, one.true)
-                axes.plot(
-                    false,
-                    true,
-                    linewidth=1.3,
-                    color=colour,
-                    label=f"{text}: {auc(values, one.true):.3f}",
-                )
-            axes.plot([0, 1], [0, 1], color=INK, linewidth=0.7, linestyle=":")
-            axes.set(
-                xlabel="share of false touches above the threshold",
-                ylabel="share of true touches above the threshold",
-                title=name,
-                aspect="equal",
-            )
-            axes.legend(
-                frameon=False,
-                fontsize=8,
-                loc="lower right",
-                title="area under ROC",
-                title_fontsize=8,
-            )
-        save_picture(figure, path)
+                label = f"{text}: {auc(values, one.true):.3f}"
+                axes.plot(100 * false, 100 * true, linewidth=1.3, color=colour, label=label)
+            axes.plot([0, 100], [0, 100], color=INK, linewidth=0.7, linestyle=":")
+            axes.set(xlabel="false touches above the threshold, %", title=name, aspect="equal")
+            plain_axes(axes)
+            axes.legend(frameon=False, fontsize=8, loc="lower right", title="area below the curve",
+                        title_fontsize=8)  # fmt: skip
+        panels[0].set_ylabel("true touches above the threshold, %")

@@ -4,16 +4,19 @@ found."""
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from eitskin.fem.grid import grid_for
 from eitskin.skin.skin import Skin
-from eitskin.view.panels import save_picture
-from eitskin.view.pictures import FOUND, INK, RIM, STYLE, Mark, Panel, draw_panel, load_matplotlib
+from eitskin.view.pictures import RIM, Mark, Panel, draw_panel
+from eitskin_studies.pictures.style import BLUE, VERMILION, drawing, legend_below
 
 MIN_LOG10 = -3.0
-MISSED = "#c62828"
+FOUND, MISSED = BLUE, VERMILION
+SENSITIVITY = "log10 of the sensitivity\nrelative to the greatest"
+CHANGE = "change of conductivity\nrelative to its largest"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,23 +49,20 @@ def draw_shapes(path: str | Path, shapes: Sequence[ShapePanel]) -> None:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
     from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
 
-    with matplotlib.rc_context(STYLE):
-        figure = matplotlib.figure.Figure(
-            figsize=(2.1 * len(shapes) + 1.3, 7.0), layout="constrained"
-        )
+    with drawing(path, 1.8 * len(shapes) + 1.3, 6.6) as figure:
         cells = figure.add_gridspec(3, len(shapes) + 1, width_ratios=[1.0] * len(shapes) + [0.06])
         rows = [[figure.add_subplot(cells[row, k]) for k in range(len(shapes))] for row in range(3)]
-        seen = coloured = None
+        seen: Any = None
+        coloured: Any = None
         for k, shape in enumerate(shapes):
             grid = grid_for(shape.skin.outline)
             draw_panel(rows[0][k], shape.skin, grid, Panel(shape.name), small=True)
             x0, y0 = grid.origin_mm
             extent = (x0, x0 + grid.nx * grid.pixel_mm, y0, y0 + grid.ny * grid.pixel_mm)
-            colours = {
+            colours: dict[str, Any] = {
                 "cmap": "viridis",
                 "vmin": MIN_LOG10,
                 "vmax": 0.0,
@@ -97,23 +97,14 @@ def draw_shapes(path: str | Path, shapes: Sequence[ShapePanel]) -> None:
             rows[2][k].plot(
                 *places[~hit].T, "x", color=MISSED, markersize=4.5, markeredgewidth=1.1, zorder=4
             )
-        labels = (
-            "log10 of the sensitivity\nover the greatest",
-            "change / its largest\nin one scene",
-        )
-        for number, (handle, label) in enumerate(zip((seen, coloured), labels, strict=True)):
+        for number, (handle, label) in enumerate(((seen, SENSITIVITY), (coloured, CHANGE))):
             figure.colorbar(handle, cax=figure.add_subplot(cells[number, -1])).set_label(label)
-        handles = [
-            Line2D(
-                [],
-                [],
-                marker=".",
-                color="none",
-                markeredgecolor=FOUND,
-                markerfacecolor=FOUND,
-                label="found",
-            ),
-            Line2D([], [], marker="x", color="none", markeredgecolor=MISSED, label="missed"),
+        marks = [
+            (Line2D([], [], marker=".", color=FOUND, linestyle="none"), "found touch"),
+            (Line2D([], [], marker="x", color=MISSED, linestyle="none"), "missed touch"),
         ]
-        figure.legend(handles=handles, loc="lower right", frameon=False, labelcolor=INK)
-        save_picture(figure, path)
+        legend_below(figure, marks, 2)
+        figure.suptitle(
+            "Sensitivity; one scene (solid: true touches, dashed: found ones); every test touch",
+            fontsize=10,
+        )

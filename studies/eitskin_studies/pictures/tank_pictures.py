@@ -1,20 +1,28 @@
 """Measured tank frames as each method shows them, and MIoU over the threshold, simulated and
 measured."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from eitskin.view.frame_pictures import true_marks
-from eitskin.view.panels import draw_panels, save_picture
-from eitskin.view.pictures import STYLE, Mark, Panel, load_matplotlib
+from eitskin.view.panels import draw_panels
+from eitskin.view.pictures import Mark, Panel
 from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.tanks import tank, touch_like
 from eitskin_studies.harness.thresholds import THRESHOLDS
-from eitskin_studies.pictures.style import BLUE, VERMILION
+from eitskin_studies.pictures.style import (
+    BLUE,
+    GREY,
+    VERMILION,
+    drawing,
+    legend_below,
+    plain_axes,
+)
 
+CURVE_COLUMNS = 4
 ROD_MM = 8.0  # as drawn; how thick the rods were is not stated
 SHORT = (
     ("linear back projection", "back projection"),
@@ -85,43 +93,48 @@ def draw_gallery(
     )
 
 
-def draw_curves(path: str | Path, results: Sequence[dict[str, Any]]) -> None:
-    """MIoU over t: on the simulated frames that t was chosen on (lines), on the measured ones
-    (dashed), and where t was put.
+def draw_curves(path: Path, data: Sequence[Mapping[str, Any]]) -> None:
+    """MIoU over t: on the simulated frames that t was chosen on, and on the measured ones.
+    ``data`` has for each method its name, the kind of data, both curves, the chosen threshold, and
+    the measured frames' MIoU there.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
         FileError: the file cannot be written.
     """
-    matplotlib = load_matplotlib()
-    columns = 4
-    with matplotlib.rc_context(STYLE):
-        rows = -(-len(results) // columns)
-        figure = matplotlib.figure.Figure(
-            figsize=(2.6 * columns, 2.1 * rows + 0.5), layout="constrained"
-        )
-        axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-        for ax in axes.flat[len(results) :]:
-            ax.set_axis_off()
-        for ax, one in zip(axes.flat, results, strict=False):
-            ax.plot(THRESHOLDS, one["tuned_curve"], color=BLUE, label="simulated")
-            ax.plot(THRESHOLDS, one["touch_like_curve"], "--", color=VERMILION, label="measured")
-            ax.plot(
-                one["threshold"],
-                float(np.mean(one["touch_like"])),
-                "o",
-                color=VERMILION,
-                markersize=5,
-            )
-            ax.axvline(one["threshold"], color=BLUE, linewidth=0.7, linestyle=":")
-            ax.set_title(f"{_short(one['name'])}\n{one['kind']}", fontsize=8)
-            ax.set_ylim(0.4, 1.0)
-            ax.tick_params(labelbottom=True)
-            ax.grid(linewidth=0.4, alpha=0.5)
-        axes.flat[0].legend(frameon=False, fontsize=7, loc="lower left")
+    rows = -(-len(data) // CURVE_COLUMNS)
+    with drawing(path, 2.6 * CURVE_COLUMNS, 2.1 * rows + 0.8) as figure:
+        panels = figure.subplots(rows, CURVE_COLUMNS, sharex=True, sharey=True, squeeze=False)
+        for axes in panels.flat[len(data) :]:
+            axes.set_axis_off()
+        for axes, one in zip(panels.flat, data, strict=False):
+            axes.plot(THRESHOLDS, one["simulated"], color=BLUE, label="simulated frames")
+            axes.plot(THRESHOLDS, one["measured"], "--", color=VERMILION, label="measured frames")
+            axes.axvline(one["threshold"], color=GREY, linewidth=0.8, linestyle=":",
+                         label="t chosen on simulated frames")  # fmt: skip
+            axes.plot(one["threshold"], one["miou"], "o", color=VERMILION, markersize=5)
+            axes.set_title(f"{_short(one['name'])}\n({one['kind']} data)", fontsize=8)
+            axes.set(xlim=(0, 1), ylim=(0.4, 1.0))
+            axes.tick_params(labelbottom=True)
+            plain_axes(axes)
         figure.supxlabel("threshold t: an object is where x > t max(x)", fontsize=9)
-        figure.supylabel("mean MIoU", fontsize=9)
-        save_picture(figure, path)
+        figure.supylabel("mean MIoU of the frames with metal", fontsize=9)
+        legend_below(figure, panels.flat[0], 3)
+
+
+def curves_data(results: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The numbers of :func:`draw_curves`."""
+    return [
+        {
+            "name": one["name"],
+            "kind": one["kind"],
+            "simulated": np.round(one["tuned_curve"], 4).tolist(),
+            "measured": np.round(one["touch_like_curve"], 4).tolist(),
+            "threshold": one["threshold"],
+            "miou": round(float(np.mean(one["touch_like"])), 4),
+        }
+        for one in results
+    ]
 
 
 def _short(name: str) -> str:

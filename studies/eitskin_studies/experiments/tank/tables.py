@@ -10,6 +10,7 @@ from eitskin_studies.experiments.tank.evaluation import EvaluationSets
 from eitskin_studies.experiments.tank.imagers import DISCS, KINDS, TUNED_DISCS, Levers
 from eitskin_studies.experiments.tank.levers import one_by_one, words_of
 from eitskin_studies.experiments.tank.tanks import TOUCH_LIKE
+from eitskin_studies.harness.drawings import Drawing
 from eitskin_studies.harness.summary import summarise
 
 CHOSEN = "eitskin, image, levers from simulation"
@@ -70,7 +71,7 @@ def outcome(
         {
             "touch_like.png": draw_metal,
             "all_frames.png": draw_signs,
-            "curves.png": lambda path: tank_pictures.draw_curves(path, shown),
+            "curves.png": Drawing(tank_pictures.draw_curves, tank_pictures.curves_data(shown)),
         },
         {"conditions": conditions(evaluation_sets, settings), "chosen": chosen_words(levers, best)},
     )
