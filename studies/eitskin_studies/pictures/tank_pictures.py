@@ -117,7 +117,8 @@ def draw_curves(path: Path, data: Sequence[Mapping[str, Any]]) -> None:
             axes.set(xlim=(0, 1), ylim=(0.4, 1.0))
             axes.tick_params(labelbottom=True)
             plain_axes(axes)
-        figure.supxlabel("threshold t: an object is where x > t max(x)", fontsize=9)
+        for axes in panels.flat[max(0, len(data) - CURVE_COLUMNS) : len(data)]:
+            axes.set_xlabel("t: an object is where x > t max(x)", fontsize=8)
         figure.supylabel("mean MIoU of the frames with metal", fontsize=9)
         legend_below(figure, panels.flat[0], 3)
 
