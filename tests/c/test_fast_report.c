@@ -130,6 +130,25 @@ TEST(where_the_two_differ_the_frame_is_shown)
     CHECK(t[0].id == 3 && t[0].x_mm == 0 && t[0].explained == 0);
 }
 
+/* In noise the place lies between that of the frame and that of drives, nearer to the more certain
+ * one. A place that drives have lost counts for nothing. */
+TEST(places_of_frame_and_drives_are_weighed)
+{
+    const eits_fast_touch followed = {.id = 3, .strength_s_per_m_mm2 = 1, .radius_mm = 7};
+    const struct {
+        double variance_mm2, x_mm, shown_mm;
+    } cases[] = {{0, 4, 4}, {9, 4, 2}, {27, 4, 1}, {9, 14, 14}};
+    set_up();
+    for (size_t n = 0; IN_TABLE(n, cases); ++n) {
+        eits_touch found = at(cases[n].x_mm, 0, 0.5);
+        found.x_variance_mm2 = found.y_variance_mm2 = (eits_real)cases[n].variance_mm2;
+        drives_follow(&followed, 1);
+        CHECK_EQUAL(report(&found, 1), 1);
+        CHECK_NEAR(t[0].x_mm, cases[n].shown_mm, 1e-5);
+        CHECK_NEAR(t[0].x_variance_mm2, cases[n].variance_mm2, 1e-5);
+    }
+}
+
 /* A touch that no drive follows counts from its second frame on, however clear it is. A frame that
  * was not solved is none, and nothing is held. */
 TEST(a_touch_beside_those_of_drives)

@@ -153,6 +153,16 @@
  * same [frames]. larger: faults are reported late; smaller: slow presses are reported as faults */
 #define EITS_FAST_FRAMES 1
 
+/* but it is used at once if no drive of the frame left more unexplained: drives are then too noisy
+ * to find the touch, and what its landing smears is less than noise [chi^2]. larger: frames of a
+ * landing palm have wrong touches; smaller: light touches come late */
+#define EITS_FAST_LITTLE_NEWS R(100.0)
+
+/* the tracker's model may be wrong by this much in a place, beside noise; a frame's place and the
+ * tracker's are weighed by their variances [mm]. larger: places of noise jump; smaller: places of
+ * the tracker's model are reported */
+#define EITS_FAST_BIASED_MM R(3.0)
+
 /* a touch ends after this many frames that do not show it [frames]. larger: false touches last;
  * smaller: one bad frame ends true ones */
 #define EITS_FAST_LOST_FRAMES 2

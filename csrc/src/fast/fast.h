@@ -113,12 +113,13 @@ struct eits_fast {
     uint32_t aligned_us; /* time of the last alignment of a frame, and the time between it and the
                             one before */
     eits_real frame_s;
-    uint32_t glitched;            /* 1: the last drive had an outlier */
-    uint32_t fresh;               /* 1: the tracker was begun since a frame was last aligned */
-    uint32_t stirred;             /* 1: touches changed in the last aligned frame */
-    uint32_t named, named_before; /* diagnostics of the last two solved frames */
-    uint32_t wild;                /* wild rows since the last frame */
-    uint32_t faulty;              /* 1: the last solved frame named an electrode */
+    eits_real news;    /* the greatest chi^2 of a drive that nothing explained, since that frame */
+    uint32_t glitched; /* 1: the last drive had an outlier */
+    uint32_t fresh;    /* 1: the tracker was begun since a frame was last aligned */
+    uint32_t stirred;  /* 1: touches changed in the last aligned frame */
+    uint32_t named, named_before;         /* diagnostics of the last two solved frames */
+    uint32_t wild;                        /* wild rows since the last frame */
+    uint32_t faulty;                      /* 1: the last solved frame named an electrode */
     uint8_t suspect[EITS_MAX_ELECTRODES]; /* for each electrode: its wild rows minus its other rows,
                                              from 0 */
     /* touches of frames, and the touches that drives followed when a frame was last aligned */

@@ -125,9 +125,11 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     fast->stirred |= !explained;
     fast->drifted = is_far(fast) ? fast->drifted + 1 : 0;
     *state = explained ? (uint32_t)EITS_FAST_EXPLAINED : 0u;
-    if (explained || fast->unexplained_frames > EITS_FAST_FRAMES || fast->faulty)
+    if (explained || fast->news < EITS_FAST_LITTLE_NEWS ||
+        fast->unexplained_frames > EITS_FAST_FRAMES || fast->faulty)
         *state |= (uint32_t)EITS_FAST_TRUSTED;
     fast->aligned = 1;
+    fast->news = 0;
     eits_fast_expect_touches(fast);
     return eits_fast_touches(fast, fast->followed, EITS_FAST_MAX_TOUCHES, &fast->n_followed);
 }

@@ -262,8 +262,10 @@ static int take_news(eits_fast *fast, uint32_t drive, uint32_t used, eits_real c
         if (fast->held_count == 0)
             eits_fast_hold_all(fast);
     }
-    if (news)
+    if (news) {
+        fast->news = eits_larger(fast->news, chi2);
         return eits_search(fast);
+    }
     if (fast->quiet >= EITS_FAST_QUIET)
         fast->held_count = fast->search.active = 0;
     if ((slow || fast->search.active) && eits_search(fast))

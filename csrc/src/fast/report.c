@@ -277,6 +277,21 @@ static eits_touch alone(const eits_fast *fast, const eits_fast_touch *t)
                         .confirmed = t->confirmed};
 }
 
+/* Place a touch that drives follow and the solver found between the two, by their variances.
+ * Without much noise the frame's place is by far the more certain one. */
+static void weigh_places(const eits_fast_touch *followed, eits_touch *found)
+{
+    const eits_real of_frame = (found->x_variance_mm2 + found->y_variance_mm2) / 2;
+    const eits_real of_drives = (followed->x_variance_mm2 + followed->y_variance_mm2) / 2 +
+                                fast_square(EITS_FAST_BIASED_MM);
+    const eits_real off[2] = {followed->x_mm - found->x_mm, followed->y_mm - found->y_mm};
+    const eits_real total = of_frame + of_drives;
+    if (!(off[0] * off[0] + off[1] * off[1] < 9 * total))
+        return; /* the touch was followed to a wrong place */
+    found->x_mm += of_frame / total * off[0];
+    found->y_mm += of_frame / total * off[1];
+}
+
 /* The touches that drives followed when the frame was aligned; returns their number. Those found
  * that are one of them are taken. */
 static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, uint32_t count,
@@ -295,7 +310,10 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
             n < count && fast_distance2(at[n], place) < fast_square(EITS_FAST_AGREE_MM);
         /* where the two differ, the frame's place is the better one; but of a palm it has discs */
         const int palm = fast_is_palm(fast_square(EITS_FAST_SOFT_RADIUS * t->radius_mm));
-        touches[k] = agrees || (n < count && !palm) ? found[n] : alone(fast, t);
+        const int shown = agrees || (n < count && !palm);
+        touches[k] = shown ? found[n] : alone(fast, t);
+        if (shown)
+            weigh_places(t, &touches[k]);
         touches[k].id = t->id;
         touches[k].confirmed = agrees || t->confirmed;
         if (n < count)

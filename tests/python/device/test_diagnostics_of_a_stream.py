@@ -75,7 +75,7 @@ def test_an_electrode_that_comes_off_is_named_and_goes_when_it_is_back(every):
         for head in heads(items)
     ]
     reported = [fault for fault in faults(items) if fault[0] == FaultCode.ELECTRODE_OPEN]
-    gone = first + UNTIL_FRAME + FAULT_CLEAR_FRAMES - 1 + (every == 1)
+    gone = first + UNTIL_FRAME + FAULT_CLEAR_FRAMES - 1
     assert reported == [
         (FaultCode.ELECTRODE_OPEN, True, OFF, first + FROM_FRAME + late),
         (FaultCode.ELECTRODE_OPEN, False, OFF, gone),
