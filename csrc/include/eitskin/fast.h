@@ -57,8 +57,9 @@ typedef struct eits_fast_touch {
 /* Bits that eits_fast_align sets for a frame. */
 typedef enum eits_fast_frame {
     EITS_FAST_EXPLAINED = 1, /* the known touches explain all drives of the frame */
-    /* the result of the whole-frame solver may be reported: the frame is explained, or no frame has
-     * been explained for a while, so that the cause is not a touch that moves */
+    /* the result of the whole-frame solver may be reported: the frame is explained; or its drives
+     * leave little unexplained, so that noise hides how touches change; or no frame has been
+     * explained for a while, so that the cause is not a touch that moves */
     EITS_FAST_TRUSTED = 2
 } eits_fast_frame;
 
@@ -247,8 +248,9 @@ void eits_fast_forget_all(eits_fast *fast);
  * 0, if the frame was not solved.
  *
  * After eits_fast_align these are the touches that drives followed at that time, each with what the
- * solver found about it. A touch that the solver found and drives do not follow is reported from
- * its second frame on. It keeps its id when drives begin to follow it, or follow it no more.
+ * solver found about it; its place is the mean of both, weighed by their variances. A touch that
+ * the solver found and drives do not follow is reported from its second frame on. It keeps its id
+ * when drives begin to follow it, or follow it no more.
  *
  * A frame that was not aligned has the touches that were found in it. A clear touch is reported at
  * once, and the second frame sets `confirmed`. A touch that explains less than 5 % of the frame, or
