@@ -150,7 +150,8 @@ extern "C" {
     ARRAY(joint.drift, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                            \
     ARRAY(joint.rest, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                             \
     ARRAY(joint.column, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_PARAMETERS * EITS_JOINT_BLOCK)) \
-    ARRAY(joint.along, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_PARAMETERS * EITS_JOINT_NUISANCES)) \
+    ARRAY(joint.left, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_BLOCK))                    \
+    ARRAY(joint.along, eits_real, EITS_JOINT_IF(n_electrodes, (EITS_JOINT_PARAMETERS + 1u) * EITS_JOINT_NUISANCES)) \
     ARRAY(joint.nuisance, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_NUISANCES * (EITS_JOINT_NUISANCES + 1u) / 2u)) \
     ARRAY(joint.normal, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_TRIANGLE))               \
     ARRAY(joint.factor, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_TRIANGLE))               \
@@ -189,10 +190,11 @@ extern "C" {
 /* Bytes of numbers for the joint fit. The multipole model keeps a pixel and a mirror per touch, and
  * the weights of the pixels around a pixel inside the skin. The joint fit keeps its gradient and
  * the part of its budget that it has spent. */
-#define EITS_JOINT_NUMBERS                                            \
-    (EITS_MAX_TOUCHES * (4u * sizeof(eits_real) + sizeof(uint32_t)) + \
-     2u * EITS_POLE_TERMS * EITS_POLE_POINTS * sizeof(eits_real) +    \
-     (EITS_JOINT_PARAMETERS + 1u) * sizeof(eits_real) + sizeof(uint32_t) + sizeof(uint64_t))
+#define EITS_JOINT_NUMBERS                                                      \
+    (EITS_MAX_TOUCHES * (4u * sizeof(eits_real) + sizeof(uint32_t)) +           \
+     2u * EITS_POLE_TERMS * EITS_POLE_POINTS * sizeof(eits_real) +              \
+     (EITS_JOINT_PARAMETERS + 1u) * sizeof(eits_real) + 2u * sizeof(uint32_t) + \
+     2u * sizeof(uint64_t) + 10u * EITS_MAX_TOUCHES * sizeof(eits_real))
 
 /* Bytes of the context, at the workspace's start. csrc/src/api/setup.c asserts that it fits, and
  * that little is left over. */

@@ -218,13 +218,25 @@ typedef struct eits_multipole {
 } eits_multipole;
 #define EITS_NO_HOME UINT32_MAX
 
+/* The knowledge about one touch by the normal equations at the present shapes, with all other
+ * parameters free. */
+typedef struct eits_joint_known {
+    eits_real place[3];   /* covariance of x and y, pixels^2: xx, xy, yy */
+    eits_real shape;      /* how far e1 and e2 are from 0, in variances; 0 for a disc */
+    eits_real rise;       /* the rise of F if its amplitude is 0 and the others adapt */
+    eits_real log_radius; /* variance */
+    /* if it were of the other kind: the rise of F, and the change of x, y and log radius */
+    eits_real other_rise, other_step[3];
+} eits_joint_known;
+
 /* Memory of the joint fit. Written by joint. */
 typedef struct eits_joint_memory {
     eits_real *weight; /* n_folded: 1 / sigma; 0 for a fold that is left out */
     eits_real *drift;  /* n_folded: the direction of the gain's drift in that metric, of length 1 */
     eits_real *rest;   /* n_folded: the residual of the held shapes (eits_joint_hold) */
+    eits_real *left;   /* EITS_JOINT_BLOCK: what the last evaluation left of a block, weighed */
     eits_real *column; /* EITS_JOINT_PARAMETERS x EITS_JOINT_BLOCK */
-    eits_real *along;  /* EITS_JOINT_PARAMETERS x EITS_JOINT_NUISANCES */
+    eits_real *along;  /* (EITS_JOINT_PARAMETERS + 1) x EITS_JOINT_NUISANCES: last, the data's */
     eits_real *nuisance; /* their factor L, packed by rows (joint/metric.c) */
     uint32_t errors;     /* vectors of the model's errors in use */
     eits_real error_unit;
@@ -233,6 +245,8 @@ typedef struct eits_joint_memory {
     uint64_t spent;                    /* multiply-accumulates of this frame's joint fits */
     uint64_t evaluated;                /* multiply-accumulates of the last evaluation with slopes */
     eits_real gradient[EITS_JOINT_PARAMETERS];
+    uint32_t is_known; /* 1: `known` belongs to the normal equations and shapes as they are */
+    eits_joint_known known[EITS_MAX_TOUCHES];
 } eits_joint_memory;
 
 /* Memory that no module owns. Each stage may use all of it, and hands it down to the functions that

@@ -18,26 +18,6 @@
 
 enum { BLOCK = EITS_JOINT_BLOCK, MAX_PARAMETERS = EITS_JOINT_PARAMETERS };
 
-eits_real eits_joint_freedom(const eits_context *ctx, const eits_joint *j)
-{
-    const eits_real free =
-        (eits_real)eits_joint_folds(ctx) - 1 - (eits_real)(EITS_JOINT_DISC * j->count);
-    return eits_larger(free, EITS_JOINT_MIN_FREEDOM);
-}
-
-eits_real eits_joint_excess(const eits_context *ctx, const eits_joint *j)
-{
-    return eits_larger(j->misfit / eits_joint_freedom(ctx, j), 1);
-}
-
-static eits_real prior_of(const eits_context *ctx, const eits_joint *j)
-{
-    eits_real sum = 0;
-    for (uint32_t k = 0; k < j->count; ++k)
-        sum += eits_joint_prior(ctx, &j->shape[k], j->parameters);
-    return sum;
-}
-
 /* ---- F and its normal equations ---- */
 
 static const eits_poles DISCS = {.orders = 3, .sent = 2}, ELLIPSES = {.orders = 5, .sent = 3};
@@ -51,11 +31,8 @@ static const eits_poles *poles_of(const eits_joint *j)
     return round ? &DISCS : &ELLIPSES;
 }
 
-/* Sums over blocks of folds. */
-typedef struct sums {
-    eits_real square;                      /* of what is left */
-    eits_real along[EITS_JOINT_NUISANCES]; /* its products with what no touch causes */
-} sums;
+/* The products of column `a` with what no touch causes, or of what is left. */
+enum { OF_DATA = MAX_PARAMETERS };
 
 static eits_real *along_of(eits_context *ctx, uint32_t a)
 {
@@ -95,10 +72,10 @@ static int holds(const eits_joint *j)
 /* What the free shapes leave of one block, weighed, and their columns into the normal equations,
  * behind them the answers of `further` discs. */
 static uint64_t add_block(eits_context *ctx, const eits_joint *j, int slopes, uint32_t further,
-                          uint32_t first, uint32_t count, sums *s)
+                          uint32_t first, uint32_t count, eits_real *square)
 {
     eits_joint_memory *m = &ctx->joint;
-    eits_real value[BLOCK], left[BLOCK];
+    eits_real value[BLOCK], *left = m->left;
     uint64_t macs = 4u * (uint64_t)count;
     eits_copy(left, (holds(j) ? m->rest : ctx->frame.d) + first, count);
     for (uint32_t free = 0; free < j->free_count; ++free) {
@@ -114,8 +91,8 @@ static uint64_t add_block(eits_context *ctx, const eits_joint *j, int slopes, ui
     }
     for (uint32_t i = 0; i < count; ++i)
         left[i] *= m->weight[first + i];
-    s->square += eits_dot(ctx->kernels, left, left, count);
-    eits_joint_add_along(ctx, left, 1, first, count, s->along);
+    *square += eits_dot(ctx->kernels, left, left, count);
+    eits_joint_add_along(ctx, left, 1, first, count, along_of(ctx, OF_DATA));
     uint32_t n = slopes ? j->free_count * j->parameters : 0;
     for (uint32_t k = j->count; k < j->count + further; ++k) {
         const eits_pole_out out = {.value = m->column + (size_t)BLOCK * n++};
@@ -164,23 +141,44 @@ uint64_t eits_joint_restore(eits_context *ctx, const eits_joint *j, uint32_t k)
     return macs + eits_pole_induced_in(ctx, j->shape, j->count, &k, 1, &ELLIPSES, 2);
 }
 
+/* What no touch causes out of the gradient by parameter `a`, and its prior into it. */
+static void finish_gradient(eits_context *ctx, const eits_shape *shape, uint32_t p, uint32_t a)
+{
+    eits_real *gradient = &ctx->joint.gradient[a];
+    *gradient -= product(ctx, along_of(ctx, a), along_of(ctx, OF_DATA));
+    *gradient =
+        eits_fma(-eits_joint_precision(shape, p), eits_joint_offset(ctx, shape, p), *gradient);
+}
+
 /* What no touch causes out of the normal equations, and the priors into them. */
-static void finish_normal(eits_context *ctx, const eits_joint *j, uint32_t further, const sums *s)
+static void finish_normal(eits_context *ctx, const eits_joint *j, uint32_t further)
 {
     eits_joint_memory *m = &ctx->joint;
     const uint32_t n = j->free_count * j->parameters;
     for (uint32_t a = 0; a < n + further; ++a) {
         const uint32_t p = a < n ? a % j->parameters : 0; /* further discs have no prior */
         const eits_shape *shape = &j->shape[a < n ? j->free[a / j->parameters] : 0];
-        const eits_real prior = eits_joint_precision(shape, p);
         eits_real *row = eits_lower_row(m->normal, a), *along = along_of(ctx, a);
         eits_joint_finish_along(ctx, along);
-        m->gradient[a] -= product(ctx, along, s->along);
-        m->gradient[a] = eits_fma(-prior, eits_joint_offset(ctx, shape, p), m->gradient[a]);
+        finish_gradient(ctx, shape, p, a);
         for (uint32_t b = 0; b <= a; ++b)
             row[b] -= product(ctx, along, along_of(ctx, b));
-        row[a] += prior;
+        row[a] += eits_joint_precision(shape, p);
     }
+    m->is_known = 0;
+}
+
+/* The gradient about *j, which was evaluated last, with the slopes of shapes near by. Returns the
+ * multiply-accumulates. */
+static uint64_t follow(eits_context *ctx, const eits_joint *j)
+{
+    eits_joint_memory *m = &ctx->joint;
+    const uint32_t folds = ctx->model->n_folded, n = j->free_count * j->parameters;
+    for (uint32_t a = 0; a < n; ++a) {
+        m->gradient[a] = eits_dot(ctx->kernels, m->column + (size_t)BLOCK * a, m->left, folds);
+        finish_gradient(ctx, &j->shape[j->free[a / j->parameters]], a % j->parameters, a);
+    }
+    return (uint64_t)n * (folds + m->errors);
 }
 
 /* The polynomial of shape k's field; a shape that would reach beyond the rim is made as small as it
@@ -205,9 +203,7 @@ static uint64_t evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds, int 
     eits_joint_memory *m = &ctx->joint;
     const uint32_t folds = ctx->model->n_folded,
                    n = (slopes ? j->free_count * j->parameters : 0) + further;
-    sums s;
-    s.square = 0;
-    eits_zero(s.along, 1u + m->errors);
+    eits_real square = 0, *along = along_of(ctx, OF_DATA);
     uint64_t macs = 0;
     for (uint32_t k = 0; k < j->free_count && rounds > 0; ++k)
         macs += bring_home(ctx, j->free[k], &j->shape[j->free[k]]);
@@ -215,18 +211,19 @@ static uint64_t evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds, int 
         eits_pole_induced_in(ctx, j->shape, j->count, j->free, j->free_count, poles_of(j), rounds);
     eits_zero(m->normal, EITS_LOWER_SIZE(n));
     eits_zero(m->gradient, n);
+    eits_zero(along, 1u + m->errors);
     for (uint32_t a = 0; a < n; ++a)
         eits_zero(along_of(ctx, a), 1u + m->errors);
     for (uint32_t first = 0; first < folds; first += BLOCK) {
         const uint32_t count = folds - first < BLOCK ? folds - first : BLOCK;
-        macs += add_block(ctx, j, slopes, further, first, count, &s);
+        macs += add_block(ctx, j, slopes, further, first, count, &square);
     }
-    j->left = eits_fma(-s.along[0], s.along[0], s.square);
-    eits_joint_finish_along(ctx, s.along);
-    j->misfit = s.square - product(ctx, s.along, s.along);
-    j->cost = j->misfit + prior_of(ctx, j);
+    j->left = eits_fma(-along[0], along[0], square);
+    eits_joint_finish_along(ctx, along);
+    j->misfit = square - product(ctx, along, along);
+    j->cost = j->misfit + eits_joint_priors(ctx, j);
     if (slopes) {
-        finish_normal(ctx, j, further, &s);
+        finish_normal(ctx, j, further);
         m->evaluated = macs;
     }
     return macs;
@@ -345,6 +342,7 @@ void eits_joint_keep(eits_context *ctx, const eits_joint *j)
 void eits_joint_back(eits_context *ctx, const eits_joint *j)
 {
     eits_copy(ctx->joint.normal, ctx->joint.kept, EITS_LOWER_SIZE(j->count * j->parameters));
+    ctx->joint.is_known = 0;
 }
 
 uint64_t eits_joint_return_to(eits_context *ctx, eits_joint *j)
@@ -372,6 +370,7 @@ void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, u
 {
     const uint32_t n = j->free_count * j->parameters;
     eits_real damping = EITS_JOINT_DAMPING;
+    int follows = 0; /* whether the slopes are those of shapes before */
     for (uint32_t step = 0; step < EITS_JOINT_STEPS; ++step) {
         eits_real d[MAX_PARAMETERS];
         factor(ctx, n, damping);
@@ -386,28 +385,21 @@ void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, u
         eits_joint trial = moved(ctx, j, d);
         *macs += evaluate(ctx, &trial, 1, 0, 0) + (uint64_t)n * n * (n + 6u) / 6u;
         const eits_real fallen = j->cost - trial.cost;
+        const eits_real off = eits_fabs(predicted - fallen);
         if (fallen > 0) {
             *j = trial;
+            ctx->joint.is_known = 0;
             damping *= EITS_JOINT_DAMP_LESS;
-            if (eits_fabs(predicted - fallen) < EITS_JOINT_AS_PREDICTED * eits_joint_excess(ctx, j))
+            if (off < EITS_JOINT_AS_PREDICTED * eits_joint_excess(ctx, j))
                 return;
-            *macs += evaluate(ctx, j, 0, 1, 0);
+            follows = ctx->model->n_folded <= BLOCK && off < EITS_JOINT_FOLLOWS * predicted;
+            *macs += follows ? follow(ctx, j) : evaluate(ctx, j, 0, 1, 0);
+        } else if (follows) {
+            *macs += evaluate(ctx, j, 1, 1, 0);
+            follows = 0;
         } else /* again, a shorter step */
             damping = eits_larger(EITS_JOINT_DAMP_MORE * damping, EITS_JOINT_DAMPED);
     }
-}
-
-void eits_joint_free_one(eits_joint *j, uint32_t k)
-{
-    j->free_count = 1;
-    j->free[0] = k;
-}
-
-void eits_joint_free_all(eits_joint *j)
-{
-    j->free_count = j->count;
-    for (uint32_t k = 0; k < j->count; ++k)
-        j->free[k] = k;
 }
 
 /* Note the step and the rise of F if the prior of log |amplitude| became that of the other kind:
@@ -452,9 +444,12 @@ static void know(const eits_joint *j, uint32_t k, eits_real *block, eits_joint_k
     known->rise = unit[amplitude] - eits_joint_precision(&j->shape[k], amplitude);
 }
 
-uint64_t eits_joint_places(eits_context *ctx, const eits_joint *j, eits_joint_known *known)
+const eits_joint_known *eits_joint_places(eits_context *ctx, const eits_joint *j, uint64_t *macs)
 {
     const uint32_t p = j->parameters, n = j->count * p;
+    eits_joint_known *known = ctx->joint.known;
+    if (ctx->joint.is_known)
+        return known;
     factor(ctx, n, 0);
     for (uint32_t k = 0; k < j->count; ++k) {
         eits_real block[EITS_LOWER_SIZE(EITS_JOINT_ELLIPSE)];
@@ -466,5 +461,7 @@ uint64_t eits_joint_places(eits_context *ctx, const eits_joint *j, eits_joint_kn
         }
         know(j, k, block, &known[k]);
     }
-    return (uint64_t)n * n * (n / 6u + n);
+    ctx->joint.is_known = 1;
+    *macs += (uint64_t)n * n * n / 2u;
+    return known;
 }

@@ -99,7 +99,12 @@ static inline eits_real eits_joint_strength(const eits_shape *s)
 }
 
 /* Let all shapes vary. */
-void eits_joint_free_all(eits_joint *j);
+static inline void eits_joint_free_all(eits_joint *j)
+{
+    j->free_count = j->count;
+    for (uint32_t k = 0; k < j->count; ++k)
+        j->free[k] = k;
+}
 
 /* Hold the shapes that are not free, after `rounds` more rounds of the fields that all send to each
  * other. As long as fewer than all shapes are free and the held ones stay those of *j, an
@@ -108,7 +113,11 @@ void eits_joint_free_all(eits_joint *j);
 uint64_t eits_joint_hold(eits_context *ctx, const eits_joint *j, uint32_t rounds);
 
 /* Let only shape k vary. */
-void eits_joint_free_one(eits_joint *j, uint32_t k);
+static inline void eits_joint_free_one(eits_joint *j, uint32_t k)
+{
+    j->free_count = 1;
+    j->free[0] = k;
+}
 
 /* Restore the field about shape k after another shape was tried in its place. */
 uint64_t eits_joint_restore(eits_context *ctx, const eits_joint *j, uint32_t k);
@@ -124,6 +133,9 @@ uint64_t eits_joint_score(eits_context *ctx, eits_joint *j, uint32_t further, ei
 
 /* Return a disc of the expected size and of the strong kind. */
 eits_shape eits_joint_usual(const eits_context *ctx, eits_real x, eits_real y, int insulates);
+
+/* Return the priors' part of F of all shapes. */
+eits_real eits_joint_priors(const eits_context *ctx, const eits_joint *j);
 
 /* Return the prior's part of F for one shape. */
 eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_t parameters);
@@ -189,20 +201,10 @@ eits_real eits_joint_freedom(const eits_context *ctx, const eits_joint *j);
 /* Return the excess: the misfit over its expectation by sigma, at least 1. */
 eits_real eits_joint_excess(const eits_context *ctx, const eits_joint *j);
 
-/* The knowledge about one touch by the normal equations at the present shapes, with all other
- * parameters free. */
-typedef struct eits_joint_known {
-    eits_real place[3];   /* covariance of x and y, pixels^2: xx, xy, yy */
-    eits_real shape;      /* how far e1 and e2 are from 0, in variances; 0 for a disc */
-    eits_real rise;       /* the rise of F if its amplitude is 0 and the others adapt */
-    eits_real log_radius; /* variance */
-    /* if it were of the other kind: the rise of F, and the change of x, y and log radius */
-    eits_real other_rise, other_step[3];
-} eits_joint_known;
-
-/* Fill in known[0 ... j->count - 1]. The normal equations must be those about *j. Returns the
- * multiply-accumulates. */
-uint64_t eits_joint_places(eits_context *ctx, const eits_joint *j, eits_joint_known *known);
+/* Return the knowledge about shapes 0 ... j->count - 1, which is kept in ctx->joint.known. It is
+ * computed only if the normal equations have changed, and these must be those about *j. Adds to
+ * `macs`. */
+const eits_joint_known *eits_joint_places(eits_context *ctx, const eits_joint *j, uint64_t *macs);
 
 /* merge.c: shapes of one sign that are so near that they may be parts of one touch form a group.
  * Each group becomes one ellipse with the group's area, strength and extent. A crowd stays as it

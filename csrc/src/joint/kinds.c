@@ -25,16 +25,19 @@ int eits_joint_turn(eits_context *ctx, eits_joint *j, uint32_t k, eits_real fall
 
 void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled, uint64_t *macs)
 {
-    eits_joint_known known[EITS_MAX_TOUCHES];
+    uint8_t open[EITS_MAX_TOUCHES];
     uint32_t tried = 0, turned = 0;
     if (eits_weighs_errors(ctx) || !(eits_joint_excess(ctx, j) < EITS_JOINT_FITTED))
         return;
-    *macs += eits_joint_places(ctx, j, known);
+    const eits_joint_known *known = eits_joint_places(ctx, j, macs);
     const eits_real most = EITS_JOINT_OTHER_RISE * eits_joint_excess(ctx, j);
+    for (uint32_t k = 0; k < j->count; ++k)
+        open[k] = known[k].other_rise < most;
     for (uint32_t k = 0; k < j->count; ++k) {
-        if (!(known[k].other_rise < most) || *macs + settled / 2u > j->most)
+        if (!open[k] || *macs + settled / 2u > j->most)
             continue;
-        ++tried;
+        if (tried++ == 0)
+            eits_joint_keep(ctx, j);
         eits_joint_free_one(j, k);
         *macs += eits_joint_hold(ctx, j, 1);
         if (eits_joint_turn(ctx, j, k, EITS_JOINT_SETTLED, macs))
@@ -48,5 +51,5 @@ void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled,
     if (turned > 0)
         eits_joint_descend(ctx, j, 1, R(INFINITY), macs);
     else
-        *macs += eits_joint_evaluate(ctx, j, 1);
+        eits_joint_back(ctx, j);
 }

@@ -10,21 +10,26 @@ int eits_joint_near(const eits_shape *a, const eits_shape *b, eits_real radii)
     return a->amplitude * b->amplitude > 0 && eits_fma(dx, dx, dy * dy) < near * near;
 }
 
-/* group[k]: the lowest number of the shapes that hang together with shape k. */
-static void find_groups(const eits_joint *j, uint32_t *group)
+/* group[k]: the lowest number of the shapes that hang together with shape k, each nearer to another
+ * than `radii` sums of their radii. Returns the number of groups. */
+static uint32_t find_groups(const eits_joint *j, eits_real radii, uint32_t *group)
 {
+    uint32_t count = 0;
     for (uint32_t k = 0; k < j->count; ++k)
         group[k] = k;
     for (uint32_t k = 1; k < j->count; ++k) {
         for (uint32_t i = 0; i < k; ++i) {
             const uint32_t low = group[i] < group[k] ? group[i] : group[k],
                            high = group[i] < group[k] ? group[k] : group[i];
-            if (low == high || !eits_joint_near(&j->shape[i], &j->shape[k], EITS_JOINT_MERGE_APART))
+            if (low == high || !eits_joint_near(&j->shape[i], &j->shape[k], radii))
                 continue;
             for (uint32_t l = 0; l <= k; ++l)
                 group[l] = group[l] == high ? low : group[l];
         }
     }
+    for (uint32_t k = 0; k < j->count; ++k)
+        count += group[k] == k;
+    return count;
 }
 
 /* The ellipse of the group's strength and second moments: an even ellipse with half axes a and b
@@ -65,21 +70,25 @@ static eits_shape of_group(const eits_joint *j, const uint32_t *group, uint32_t 
 
 uint32_t eits_joint_merge(eits_joint *j)
 {
-    uint32_t group[EITS_MAX_TOUCHES], count = 0;
+    uint32_t group[EITS_MAX_TOUCHES], count = find_groups(j, EITS_JOINT_MERGE_APART, group);
+    const int crowd = count >= EITS_JOINT_CROWD;
+    if (crowd)
+        count = find_groups(j, EITS_JOINT_MERGE_CROWD, group);
+    const uint32_t fewer = j->count - count;
+    if (fewer == 0)
+        return 0;
     eits_joint merged = *j;
-    find_groups(j, group);
+    merged.count = 0;
     for (uint32_t k = 0; k < j->count; ++k) {
         if (group[k] != k)
             continue;
-        merged.from[count] = j->from[k];
-        merged.shape[count++] = of_group(j, group, k);
+        eits_shape *of = &merged.shape[merged.count];
+        *of = of_group(j, group, k);
+        if (crowd)
+            of->e1 = of->e2 = 0;
+        merged.from[merged.count++] = j->from[k];
     }
-    /* near discs of a crowd are merged where the search finds that they are one */
-    const uint32_t fewer = count < EITS_JOINT_CROWD ? j->count - count : 0;
-    if (fewer > 0) {
-        merged.count = count;
-        merged.parameters = EITS_JOINT_ELLIPSE;
-        *j = merged;
-    }
-    return fewer;
+    merged.parameters = crowd ? EITS_JOINT_DISC : EITS_JOINT_ELLIPSE;
+    *j = merged;
+    return crowd ? 0 : fewer;
 }

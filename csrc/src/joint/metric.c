@@ -27,6 +27,18 @@ uint32_t eits_joint_folds(const eits_context *ctx)
     return used;
 }
 
+eits_real eits_joint_freedom(const eits_context *ctx, const eits_joint *j)
+{
+    const eits_real free =
+        (eits_real)eits_joint_folds(ctx) - 1 - (eits_real)(EITS_JOINT_DISC * j->count);
+    return eits_larger(free, EITS_JOINT_MIN_FREEDOM);
+}
+
+eits_real eits_joint_excess(const eits_context *ctx, const eits_joint *j)
+{
+    return eits_larger(j->misfit / eits_joint_freedom(ctx, j), 1);
+}
+
 eits_real eits_joint_data(const eits_context *ctx)
 {
     const eits_joint_memory *m = &ctx->joint;

@@ -99,6 +99,14 @@ eits_real eits_joint_prior(const eits_context *ctx, const eits_shape *s, uint32_
     return sum;
 }
 
+eits_real eits_joint_priors(const eits_context *ctx, const eits_joint *j)
+{
+    eits_real sum = 0;
+    for (uint32_t k = 0; k < j->count; ++k)
+        sum += eits_joint_prior(ctx, &j->shape[k], j->parameters);
+    return sum;
+}
+
 /* The shape of the same strength q r^2 that has the amplitude of `as`. */
 static eits_shape shape_as(const kind *as, const eits_shape *s)
 {
@@ -126,14 +134,15 @@ static const kind *other_kind(const eits_shape *s)
 
 void eits_joint_guess_kinds(const eits_context *ctx, eits_joint *j)
 {
+    eits_joint strong = *j, light = *j;
+    eits_real rise = 0;
     for (uint32_t k = 0; k < j->count; ++k) {
-        const eits_shape strong = eits_joint_as_strong(&j->shape[k]),
-                         light = shape_as(&LIGHT, &strong);
-        j->shape[k] = eits_joint_prior(ctx, &light, EITS_JOINT_DISC) <
-                              eits_joint_prior(ctx, &strong, EITS_JOINT_DISC)
-                          ? light
-                          : strong;
+        strong.shape[k] = eits_joint_as_strong(&j->shape[k]);
+        light.shape[k] = shape_as(&LIGHT, &strong.shape[k]);
+        rise += eits_joint_prior(ctx, &light.shape[k], EITS_JOINT_DISC) -
+                eits_joint_prior(ctx, &strong.shape[k], EITS_JOINT_DISC);
     }
+    *j = rise < 0 ? light : strong;
 }
 
 eits_shape eits_joint_as_other(const eits_shape *s)

@@ -162,8 +162,7 @@ static void take(eits_context *ctx, const eits_joint *j, const eits_joint_known 
 int eits_joint_take_if_clear(eits_context *ctx, const eits_joint *j, uint32_t fewer, uint32_t begun,
                              eits_fit *f)
 {
-    eits_joint_known known[EITS_MAX_TOUCHES];
-    f->macs += eits_joint_places(ctx, j, known);
+    const eits_joint_known *known = eits_joint_places(ctx, j, &f->macs);
     if (!is_clear(ctx, j, known, fewer, begun) || any_may_be_one(ctx, j, known))
         return 0;
     take(ctx, j, known, f);
@@ -172,15 +171,13 @@ int eits_joint_take_if_clear(eits_context *ctx, const eits_joint *j, uint32_t fe
 
 void eits_joint_take(eits_context *ctx, const eits_joint *j, eits_fit *f)
 {
-    eits_joint_known known[EITS_MAX_TOUCHES];
-    f->macs += eits_joint_places(ctx, j, known);
+    const eits_joint_known *known = eits_joint_places(ctx, j, &f->macs);
     take(ctx, j, known, f);
 }
 
 void eits_joint_refine(eits_context *ctx, const eits_joint *j, eits_fit *f)
 {
-    eits_joint_known known[EITS_MAX_TOUCHES];
-    f->macs += eits_joint_places(ctx, j, known);
+    const eits_joint_known *known = eits_joint_places(ctx, j, &f->macs);
     for (uint32_t k = f->count; k < j->count; ++k) /* parts of what was split */
         inherit(f, j->from[k], k);
     report(ctx, j, known, f);

@@ -170,8 +170,7 @@ static void leave_out(eits_joint *j, uint32_t k)
 /* Leave out the weakest shape where the data do without it; *j becomes that. */
 static int try_fewer(eits_context *ctx, eits_joint *j, uint64_t *macs)
 {
-    eits_joint_known known[EITS_MAX_TOUCHES];
-    *macs += eits_joint_places(ctx, j, known);
+    const eits_joint_known *known = eits_joint_places(ctx, j, macs);
     const uint32_t k = weakest(j, known);
     if (j->count < 2u || !(known[k].rise < EITS_JOINT_NEEDED * eits_joint_excess(ctx, j)))
         return 0;
