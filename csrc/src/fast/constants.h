@@ -131,6 +131,11 @@
  * smaller: a bounce gives a new id */
 #define EITS_FAST_GONE 32
 
+/* the peak of a touch that has been off for longer fades with this time constant; its signal that
+ * stays meanwhile is the skin's creep [drives]. larger: a finger that presses lightly where it had
+ * pressed hard is reported late; smaller: creep is reported as a touch */
+#define EITS_FAST_FORGETS R(2000.0)
+
 /* the chi^2 that a touch explains is averaged over this many drives [drives]. as FAST_FAINT */
 #define EITS_FAST_ENERGY_DRIVES R(8.0)
 
@@ -234,6 +239,15 @@
 /* rms by which the place of a still touch changes during a drive [mm]. larger: places jitter;
  * smaller: they stay wrong */
 #define EITS_FAST_STILL_MM R(0.03)
+
+/* the same while another touch slides [mm]. larger: still touches are dragged by one that slides
+ * past; smaller: a touch that begins to slide beside another stays behind, and its strength moves
+ * to the other */
+#define EITS_FAST_BESIDE_MM R(0.3)
+
+/* a touch that moves faster than this and is older than FAST_YOUNG slides [mm/s]. larger: as
+ * FAST_BESIDE_MM smaller; smaller: still touches jitter */
+#define EITS_FAST_SLIDES R(60.0)
 
 /* a moving touch that moves by less in FAST_SLOW_DRIVES becomes still [mm]. larger: slow fingers
  * stand still; smaller: still touches are dragged by others that land */

@@ -130,6 +130,9 @@ struct eits_fast {
         kept_used; /* ids kept at the last alignment; kept_used: 1: one of them was given */
     fast_seen seen[EITS_MAX_TOUCHES];
     eits_fast_touch followed[EITS_FAST_MAX_TOUCHES];
+    /* the places of those that were off, of which the solver may find what the skin keeps */
+    uint32_t n_off;
+    eits_real off_at[EITS_FAST_MAX_TOUCHES][2];
     /* touches that drives may find again: their ids, their places, and which were found */
     uint32_t n_expected, expected_id[EITS_MAX_TOUCHES];
     eits_real expected_at[EITS_MAX_TOUCHES][2];
@@ -358,6 +361,8 @@ void eits_fast_add(eits_fast *fast, const eits_real *state, eits_real (*covarian
 void eits_fast_set_covariance(eits_fast *fast, uint32_t k, eits_real (*covariance)[FAST_SIZE]);
 /* Set the speed of touch k to 0. */
 void eits_fast_still(eits_fast *fast, uint32_t k);
+/* It is on. If it was off for longer than a bounce lasts, it is another touch, with its own id. */
+void eits_fast_put_on(eits_fast *fast, uint32_t k);
 void eits_fast_forget(eits_fast *fast, uint32_t k);
 
 /* ---- map.c ---- */

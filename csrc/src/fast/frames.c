@@ -112,6 +112,7 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     int explained = fast->held_count == 0;
     for (uint32_t n = 0; n < fast->drives; ++n)
         explained &= fast->drive[n].explained;
+    fast->n_off = 0;
     for (uint32_t k = 0; k < fast->count; ++k) {
         /* Tracks that do not explain the drives cannot bring them to one instant. */
         if (has_moved(fast, k, &fast->stirred) && explained)
@@ -119,6 +120,10 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
         fast->stirred |= !fast->known[k].on;
         fast->known[k].aligned = 1;
         eits_copy(fast->known[k].at, fast->state + FAST_SIZE * k, 2);
+        if (!fast->known[k].on) {
+            eits_copy(fast->off_at[fast->n_off], fast->known[k].at, 2);
+            eits_place_on_skin(fast->ctx, fast->off_at[fast->n_off++]);
+        }
     }
     fast->frame_explained = (uint32_t)explained;
     fast->unexplained_frames = explained ? 0 : fast->unexplained_frames + 1;

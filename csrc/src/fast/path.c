@@ -338,6 +338,16 @@ static void speed_up(eits_fast *fast, uint32_t k, const eits_real *then)
     }
 }
 
+/* A touch that lifts may leave a part of its signal, which fades in seconds: the skin creeps. It is
+ * followed as a touch that is off, so that it is not found as a new touch. What has not faded when
+ * its peak is forgotten is a finger that presses lightly. A touch that was there for less time may
+ * have been a wrong place, at the rim of a palm. */
+static int creeps(const eits_fast *fast, const fast_known *known)
+{
+    return known->confirmed && known->age > EITS_FAST_WIDENS && known->energy >= EITS_FAST_FAINT &&
+           fast->count < EITS_FAST_MAX_TOUCHES;
+}
+
 /* Which touches are on, and which have gone. */
 static void update_known(eits_fast *fast, const fast_drive *d, uint32_t there)
 {
@@ -351,12 +361,15 @@ static void update_known(eits_fast *fast, const fast_drive *d, uint32_t there)
         if (!(strength >= EITS_FAST_OFF * known->peak && known->energy >= EITS_FAST_FAINT))
             known->on = 0;
         else if (strength > EITS_FAST_ON * known->peak && known->energy > 2 * EITS_FAST_FAINT)
-            known->on = 1;
+            eits_fast_put_on(fast, k);
         known->off_drives = known->on ? 0 : known->off_drives + 1;
+        if (known->off_drives > EITS_FAST_GONE)
+            known->peak -= known->peak / EITS_FAST_FORGETS;
         slow_down(fast, k);
         if (!known->moving && known->on && (there >> k & 1u) != 0)
             speed_up(fast, k, d->then[k]);
-        if (known->off_drives > EITS_FAST_GONE || !eits_fast_on_skin(fast, state, known->rho2) ||
+        const int gone = known->off_drives > EITS_FAST_GONE && !creeps(fast, known);
+        if (gone || !eits_fast_on_skin(fast, state, known->rho2) ||
             !eits_all_finite(state, FAST_SIZE))
             eits_fast_drop(fast, k);
         else if (!known->on && known->moving)

@@ -293,7 +293,7 @@ static void weigh_places(const eits_fast_touch *followed, eits_touch *found)
 }
 
 /* The touches that drives followed when the frame was aligned; returns their number. Those found
- * that are one of them are taken. */
+ * that are one of them are taken, and those that a lifted touch has left. */
 static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, uint32_t count,
                                 uint8_t *taken, eits_touch *touches)
 {
@@ -316,6 +316,11 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
             weigh_places(t, &touches[k]);
         touches[k].id = t->id;
         touches[k].confirmed = agrees || t->confirmed;
+        if (n < count)
+            taken[n] = 1;
+    }
+    for (uint32_t k = 0; k < fast->n_off; ++k) {
+        const uint32_t n = nearest(fast->off_at[k], (const eits_real(*)[2])at, taken, count);
         if (n < count)
             taken[n] = 1;
     }

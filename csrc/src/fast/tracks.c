@@ -7,6 +7,8 @@
  * noise's own. */
 #include "fast/fast.h"
 
+#include "search/constants.h"
+
 /* F P F' without a matrix product: F adds dt times the speed to a place, so that rows change first,
  * then columns. */
 static void carry(eits_fast *fast, uint32_t at, eits_real dt_s)
@@ -22,8 +24,22 @@ static void carry(eits_fast *fast, uint32_t at, eits_real dt_s)
     }
 }
 
+/* Whether a touch slides: fingers of one hand move together, so that the others may begin to. One
+ * that has just landed may have a speed because another lands beside it. */
+static int any_slides(const eits_fast *fast)
+{
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        const eits_real *speed = fast->state + FAST_SIZE * k + FAST_VX;
+        if (fast->known[k].on && fast->known[k].moving && fast->known[k].age > EITS_FAST_YOUNG &&
+            speed[0] * speed[0] + speed[1] * speed[1] > fast_square(EITS_FAST_SLIDES))
+            return 1;
+    }
+    return 0;
+}
+
 void eits_fast_predict(eits_fast *fast, eits_real dt_s)
 {
+    const eits_real still_mm = any_slides(fast) ? EITS_FAST_BESIDE_MM : EITS_FAST_STILL_MM;
     /* The noise that comes with time is in proportion to it, whatever the scan's rate. */
     const eits_real drives = dt_s / EITS_FAST_DRIVE_S;
     for (uint32_t k = 0; k < fast->count; ++k) {
@@ -32,7 +48,7 @@ void eits_fast_predict(eits_fast *fast, eits_real dt_s)
         const int coasts = (fast->unexplained & EITS_FAST_COASTS) != EITS_FAST_COASTS;
         const uint32_t at = FAST_SIZE * k, moving = fast->known[k].moving;
         const uint32_t first = moving ? at + FAST_VX : at + FAST_X;
-        const eits_real noise = moving ? EITS_FAST_SPEED_NOISE : EITS_FAST_STILL_MM;
+        const eits_real noise = moving ? EITS_FAST_SPEED_NOISE : still_mm;
         const eits_real strength = EITS_FAST_STRENGTH_NOISE * fast->known[k].peak;
         if (moving && coasts)
             carry(fast, at, dt_s);
@@ -218,6 +234,16 @@ void eits_fast_add(eits_fast *fast, const eits_real *state, eits_real (*covarian
                                   .rho2 = rho2};
     fast->known[k].moving = covariance[FAST_VX][FAST_VX] > 0;
     fast->born = 1;
+}
+
+void eits_fast_put_on(eits_fast *fast, uint32_t k)
+{
+    fast_known *known = &fast->known[k];
+    known->on = 1;
+    if (known->off_drives <= EITS_FAST_GONE)
+        return;
+    known->id = eits_fast_id_at(fast, fast->state + (size_t)FAST_SIZE * k);
+    known->confirmed = 0;
 }
 
 void eits_fast_still(eits_fast *fast, uint32_t k)

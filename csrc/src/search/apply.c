@@ -127,8 +127,8 @@ void eits_apply_replace(eits_fast *fast, const fast_trial *trial)
     eits_fast_set_covariance(fast, k, covariance);
     known->rho2 = trial->rho2;
     known->moving = trial->body[0].numbers == 4;
+    eits_fast_put_on(fast, k);
     known->slow = known->age = known->off_drives = 0;
-    known->on = 1;
     known->peak = eits_larger(state[FAST_C], R(0.3) * known->peak);
     end(fast, trial);
 }

@@ -1,6 +1,7 @@
 """The fast path on rows in time: the same decisions in both widths, and ids that are given once.
 acceptance/test_scans_in_time.py has what it reports of touches, tests/c/test_fast.c its steps."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -12,7 +13,7 @@ from eitskin.core.fast import FastCore, FastTouch
 from eitskin.core.results import Reconstruction
 from eitskin.model.eitm import encode_model
 from eitskin.model.prebuilt import load_prebuilt
-from scans_in_time import SCENES, Player, States, played, press
+from scans_in_time import SCENES, Player, States, TrueInTime, played, press, scan_of
 
 SEED, ELEMENTS = 5, 3500
 
@@ -69,3 +70,48 @@ def test_a_model_without_fields_has_no_drives():
     """Its touches are followed from frame to frame (test_tracking.py)."""
     model = replace(load_prebuilt()[0], fields=None)
     assert FastCore(CoreEngine(encode_model(model))).rows == []
+
+
+def _false(states: States, paths: list[list[tuple[float, ...]]]) -> tuple[int, set[int]]:
+    """The false touches and the ids of a scene of ``paths`` of (s, mm, mm, press). A finger has
+    lifted when its press falls below a tenth."""
+    player, rng = Recorder(*load_prebuilt()), np.random.default_rng(SEED)
+    sigma = float(np.sqrt(np.mean(states.v0[0] ** 2))) / 1e3
+    player.tare(states.v0[0], sigma, rng)
+    scan = scan_of(player.fast, max(path[-1][0] for path in paths) + 0.02)
+    volts = states.volts(0, paths, scan.frames)
+    truth = []
+    for path in paths:
+        lifted = [t for t, _, _, level in path[1:] if level < 0.1]
+        truth.append(TrueInTime(path[0][0], [*lifted, path[-1][0]][0], _follows(np.array(path))))
+    out = player.play(scan, volts + sigma * rng.standard_normal(len(volts)), truth)
+    return out.false, {t.id for report in player.reports for t in report}
+
+
+def _follows(keys: np.ndarray) -> Callable[[float], np.ndarray]:
+    return lambda t: np.array([np.interp(t, keys[:, 0], keys[:, i]) for i in (1, 2)])
+
+
+def test_what_the_skin_keeps_of_a_lifted_touch_is_not_a_new_touch(solved):
+    """A tenth of the signal stays and fades in 0.3 s. A finger that lands there afterwards is
+    another touch."""
+    at = (60.0, 20.0)
+    times = (0.05, 0.08, 0.3, 0.33, 0.6, 0.63, 0.75)
+    levels = (0.0, 1.0, 1.0, 0.04, 0.0, 1.0, 1.0)
+    path = [(t, *at, level) for t, level in zip(times, levels, strict=True)]
+    lifted = path[:5]
+    assert _false(solved["presses"], [lifted]) == (0, {1})
+    assert _false(solved["presses"], [path])[1] == {1, 2}
+
+
+def test_two_fingers_that_cross_stay_two(solved):
+    """They pass each other 21 mm apart at 300 mm/s, the second a tenth of a second later."""
+    paths = []
+    for late_s, here, there in (
+        (0.0, (6.1, 8.5), (-17.9, -46.5)),
+        (0.1, (-33.4, -7.0), (21.5, -31.0)),
+    ):
+        times = (0.07 + late_s, 0.11 + late_s, 0.31 + late_s, 0.35 + late_s)
+        places = (here, here, there, there)
+        paths.append([(t, *at, 1.0) for t, at in zip(times, places, strict=True)])
+    assert _false(solved["presses"], paths) == (0, {1, 2})
