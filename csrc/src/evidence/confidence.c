@@ -1,4 +1,5 @@
-/* What the test's numbers have meant on scenes with a truth.
+/* The touch test's numbers become a confidence and a bound of the place, as counted on scenes whose
+ * truth is known.
  *
  * The test tells how much more likely the data are with a disc than without, under the errors that
  * the model admits to. It does not say how often that has been right, nor how far places were off:

@@ -7,10 +7,10 @@
  * Sigma's: F Sigma F. Rows left out make F a triangle: F (errors) F', and the noise of the rows
  * that are left (frame/whitening.c).
  *
- * The gain's drift is projected out of y and of all answers; in the metric of Sigma it is once
- * more, so that it costs nothing to explain.
+ * The gain's drift is projected out of y and of all answers. It is projected out once more in the
+ * metric of Sigma, so that explaining it costs nothing.
  *
- * Costs rank^3 / 6 multiply-accumulates for the factor, rank^2 / 2 for each vector. */
+ * The factor costs rank^3 / 6 multiply-accumulates, and each vector costs rank^2 / 2. */
 #include "evidence/evidence.h"
 
 #include "base/log.h"
@@ -50,8 +50,8 @@ static eits_real *row_of_factor(const eits_context *ctx, uint32_t i)
     return ctx->evidence.factor + EITS_STRIDE(ctx->model->rank) * i;
 }
 
-/* What Sigma is the sum of: so much of the model's errors, of the sheet's drift and of white
- * noise. */
+/* The factors of the three parts of which Sigma is the sum: the model's errors, the sheet's drift
+ * and white noise. */
 typedef struct shares {
     eits_real errors, drift, noise;
 } shares;

@@ -1,19 +1,22 @@
-/* Which discs stay: backward elimination by likelihood ratio.
+/* Backward elimination by likelihood ratio decides which discs stay.
  *
- * The discs as fitted are linearised once; the linearisation tells what F would rise by without
- * each. Where every rise is far above the threshold, nothing else is done. Else the discs are
- * fitted to the data in Sigma's metric, and so are those without the weakest. The simpler answer is
- * taken while F rises by less than the threshold, times what the data fit worse than they should:
- * where the model is wrong by more than it says, more is asked of a touch.
+ * The discs as fitted are linearised once. The linearisation tells by how much F would rise without
+ * each of them. Where every rise is far above the threshold, nothing else is done. Otherwise the
+ * discs are fitted to the data in Sigma's metric, and so are the discs without the weakest one. The
+ * simpler answer is taken while F rises by less than the threshold times the factor by which the
+ * data fit worse than they should. So a touch needs more evidence where the model is wrong by more
+ * than it says.
  *
- * Where no more columns may be made, the linearisation alone decides: what it can do without goes.
+ * Where no more columns may be made, the linearisation alone decides: the discs that it can do
+ * without are left out.
  */
 #include "evidence/verdict.h"
 
 #include "base/vec.h"
 #include "evidence/constants.h"
 
-/* As many shapes as there is room for; what is stored then belongs to another answer. */
+/* Give the answer as many shape parameters as there is room for. The stored linearisation then
+ * belongs to another answer. */
 static void add_shapes(const eits_context *ctx, eits_answer *answer, eits_likelihood *likelihood)
 {
     const uint32_t parameters = eits_shape_parameters(ctx, answer->count);
@@ -73,7 +76,7 @@ int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict 
                    uint64_t *macs)
 {
     eits_likelihood now = {.at_hand = 0};
-    /* of the discs as they came, which would be gone on with another time */
+    /* Columns of the discs as they came, with which a later elimination would begin again. */
     const uint32_t others = eits_columns_of(&v->answer);
     if (to_the_end && !eits_may_make(ctx, eits_columns_of(&v->answer)))
         return 0;

@@ -14,7 +14,7 @@
 
 typedef eits_real block[EITS_LOWER_SIZE(EITS_SHAPE_PARAMETERS)];
 
-/* 1 / deviation^2 of a parameter's prior: none for strength and place. */
+/* 1 / deviation^2 of a parameter's prior. Strength and place have no prior. */
 static eits_real precision(uint32_t parameter)
 {
     if (parameter < EITS_PLACE_PARAMETERS - 1)
@@ -22,7 +22,7 @@ static eits_real precision(uint32_t parameter)
     return parameter < EITS_EDGE_PARAMETERS ? EITS_SHAPE_PRECISION : EITS_DIPOLE_PRECISION;
 }
 
-/* How far a parameter is from its prior's middle. */
+/* The distance of a parameter from the middle of its prior. */
 static eits_real offset(const eits_answer *answer, uint32_t k, uint32_t parameter)
 {
     if (parameter < EITS_PLACE_PARAMETERS - 1)
@@ -32,7 +32,8 @@ static eits_real offset(const eits_answer *answer, uint32_t k, uint32_t paramete
     return answer->shape[k][parameter - EITS_PLACE_PARAMETERS];
 }
 
-/* The priors' part of F, summed touch by touch in the order of parameters: the same bits anywhere.
+/* The priors' part of F. It is summed touch by touch in the order of parameters, so that its bits
+ * are the same on every target.
  */
 static eits_real prior_of(const eits_answer *answer)
 {
@@ -236,7 +237,7 @@ uint64_t eits_linear_drop(eits_context *ctx, const eits_scratch *scratch, eits_a
     return (uint64_t)p * (n * (n + p) + 2u * rank);
 }
 
-/* By how much a step is longer than the linearisation holds; at least 1. */
+/* The factor by which a step is longer than the linearisation holds; it is at least 1. */
 static eits_real too_long(const eits_context *ctx, const eits_answer *from, const eits_real *step)
 {
     const eits_real radius = EITS_MAX_RADIUS_MOVE * (eits_real)ctx->model->pixel_mm;
@@ -252,9 +253,9 @@ static eits_real too_long(const eits_context *ctx, const eits_answer *from, cons
     return over;
 }
 
-/* Shortened as a whole where it is too long, since near discs give and take: bounded one by one,
- * parts of a step no longer make up for each other. A place off the skin is refused, strength and
- * shape still move. */
+/* The answer moved by a step. A step that is too long is shortened as a whole: near discs give to
+ * and take from each other, and if the parts of a step were bounded one by one they would no longer
+ * make up for each other. A place off the skin is refused; strength and shape still move. */
 static eits_answer moved(const eits_context *ctx, const eits_answer *from, const eits_real *step,
                          eits_real fraction)
 {
@@ -323,8 +324,8 @@ uint64_t eits_refit(eits_context *ctx, const eits_scratch *scratch, eits_answer 
         const eits_answer trial = moved(ctx, answer, likelihood->step, fraction);
         eits_real misfit;
         macs += misfit_of(ctx, scratch, &trial, &misfit);
-        /* Only what is better is taken, so that no refit makes an answer worse; a shorter step from
-         * the same linearisation is tried else. */
+        /* Only a better answer is taken, so that no refit makes an answer worse. Otherwise a
+         * shorter step from the same linearisation is tried. */
         if (misfit < likelihood->here) {
             *answer = trial;
             likelihood->here = misfit;

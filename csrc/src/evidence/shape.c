@@ -1,4 +1,4 @@
-/* What a disc's parameters move the data by, and shapes that are no discs.
+/* The derivatives of the data by a disc's parameters, and the answers of shapes that are no discs.
  *
  * An ellipse differs from a disc of its area to first order in two ways: its edge lies r cos 2 phi
  * and r sin 2 phi further out, and its dipole is stronger along one axis than along the other. With
@@ -48,8 +48,8 @@ void eits_leave_out(eits_answer *answer, uint32_t k)
     memmove(&answer->shape[k], &answer->shape[k + 1u], after * sizeof answer->shape[k]);
 }
 
-/* What the disc answers as a dipole that turns: so much of Re and of Im. Its fields are in
- * scratch->pixel[0]. */
+/* The disc's answer as a dipole that is stronger along one axis: part[0] of the real part and
+ * part[1] of the imaginary part. The disc's fields are in scratch->pixel[0]. */
 static uint64_t dipole(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
                        const eits_real part[2], eits_real *out)
 {

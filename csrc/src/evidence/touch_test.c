@@ -1,16 +1,19 @@
-/* The test of touches as a whole: under which covariance, and for how long.
+/* The whole test of touches: it decides under which covariance the discs are tested, and for how
+ * long.
  *
  * Discs that are clear need one look. The others are eliminated (elimination.c); as soon as the
  * data are found not to fit, the same is done for a sheet that has drifted since its reference (+
  * D). The likelier of the two stands, by F + threshold n + log det Sigma: allowing for a drift that
- * is not there would cost light touches. What has no drift is gone on with only where F as it is
- * leaves it a chance. At last what its shape says to be two rather than one is tried as two.
+ * is not there would cost light touches. The sheet without drift is tested further only where its F
+ * leaves it a chance. At last each disc whose shape says that it is two touches rather than one is
+ * tried as two.
  *
- * A frame costs no more than options.test_columns allows: each step asks before (eits_may_make),
- * and where it may not, what stands is reported, and the count said to be uncertain. A sheet that
- * has drifted shows at the first look, and it takes all those columns to tell its touches from what
- * the drift has made. Elsewhere more of them are mostly in vain: fit and test together then have
- * EITS_STILL_COLUMNS, a move of a disc costing about what a column does. */
+ * A frame costs no more than options.test_columns allows: each step asks first whether it may
+ * (eits_may_make). Where it may not, the answer so far is reported, and the count is said to be
+ * uncertain. A sheet that has drifted shows at the first look, and all those columns are needed to
+ * tell its touches from the effects of the drift. On other sheets more columns mostly change
+ * nothing: fit and test together then have EITS_STILL_COLUMNS, where a move of a disc costs about
+ * as much as a column. */
 #include "evidence/verdict.h"
 
 #include "base/vec.h"
@@ -47,7 +50,8 @@ static uint32_t likeliest_pair(const eits_context *ctx, const eits_verdict *v)
     return may_be ? likeliest : count;
 }
 
-/* What F is to fall by for disc k as two: the more the less its shape says so. */
+/* The amount by which F has to fall for disc k to become two discs. It is larger where the disc's
+ * shape speaks less for two. */
 static eits_real needed_fall(const eits_context *ctx, const eits_verdict *v, uint32_t k,
                              eits_real misfit, uint32_t count)
 {
@@ -63,8 +67,9 @@ static int may_fall(const eits_context *ctx, const eits_verdict *v, uint32_t k, 
     return v->here - misfit > needed_fall(ctx, v, k, misfit, v->answer.count + 1u);
 }
 
-/* Disc k as two, where F falls enough; 1 if they are taken. Twice the usual steps: one disc and two
- * are compared at their best. Two that are far from it after the first are given up. */
+/* Replace disc k by two where F falls enough. Returns 1 if the two are taken. The fit has twice the
+ * usual steps, because one disc and two are compared at their best. Two that are far from it after
+ * the first fit are given up. */
 static int take_split(eits_context *ctx, const eits_scratch *scratch, eits_verdict *v, uint32_t k,
                       uint64_t *macs)
 {
@@ -112,7 +117,8 @@ static void split(eits_context *ctx, const eits_scratch *scratch, const eits_fit
         k = likeliest_pair(ctx, v);
 }
 
-/* What may be made for a sheet that has not drifted; 0: any number. */
+/* The number of columns that may be made for a sheet that has not drifted; 0 stands for any number.
+ */
 static uint32_t columns_without_drift(const eits_context *ctx, const eits_fit *f)
 {
     const uint32_t all = ctx->options.test_columns,
@@ -122,7 +128,7 @@ static uint32_t columns_without_drift(const eits_context *ctx, const eits_fit *f
     return all < left ? all : left;
 }
 
-/* Which discs stay, in v, which has them all; 0 where they cannot be tested. */
+/* Leave in v, which has all discs, those that stay. Returns 0 where they cannot be tested. */
 static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_verdict *v)
 {
     eits_verdict drifted = *v;

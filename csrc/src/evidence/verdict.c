@@ -1,11 +1,12 @@
-/* What one linearisation tells of each disc of an answer: its rise, its place, its shape. */
+/* One linearisation tells of each disc of an answer the rise of F without it, its place and its
+ * shape. */
 #include "evidence/verdict.h"
 
 #include "base/vec.h"
 #include "evidence/constants.h"
 
-/* What fits worse than its covariance says needs more evidence for each disc, in proportion. Never
- * less: a misfit below that is luck. */
+/* Data that fit worse than their covariance says need more evidence for each disc, in proportion.
+ * They never need less: a misfit below that is luck. */
 eits_real eits_excess(const eits_context *ctx, eits_real misfit, uint32_t count)
 {
     const eits_real data = (eits_real)(ctx->model->rank - ctx->evidence.drifts),
@@ -26,7 +27,8 @@ uint32_t eits_weakest(const eits_scratch *scratch, const eits_answer *answer,
     return weakest;
 }
 
-/* How well a place is known: the inverse's block, times what the data fit worse. */
+/* The covariance of a place: the inverse's block times the factor by which the data fit worse than
+ * they should. */
 static void place_of(const eits_context *ctx, const eits_scratch *scratch,
                      const eits_likelihood *likelihood, eits_verdict *v, uint32_t k)
 {

@@ -138,8 +138,9 @@ void eits_fast_learn(eits_fast *fast, uint32_t drive)
         left[i] /= line[i];
         fast_axpy(left, -left[i], line, i);
     }
-    /* What was learned stands for what was expected before the update. By what is expected after
-     * it, a drive that takes strength from a touch would raise its error in each scan. */
+    /* The learned error is stored with the answer that was expected before the update (bias_h). If
+     * it were stored with the answer that is expected after it, a drive that takes strength from a
+     * touch would raise its error in each scan. */
     for (uint32_t i = 0; i < d->count; ++i) {
         const eits_real error = fast->error[i], noise = fast_square(fast->sigma);
         const eits_real share = eits_larger(EITS_FAST_BIAS_LEAST, error / (error + noise));

@@ -4,8 +4,8 @@
 
 #include "context/places.h"
 
-/* Where touch k was, and how strong, when a drive was last measured; with no strength, as it is,
- * where it was not there. */
+/* The place and strength of touch k when a drive was last measured. Where the touch was not there
+ * yet, its place is that of now and its strength is zero. */
 static const eits_real *was(const fast_drive *d, uint32_t k, const eits_real *now,
                             eits_real spare[FAST_WAYS])
 {
@@ -19,7 +19,8 @@ static const eits_real *was(const fast_drive *d, uint32_t k, const eits_real *no
     return spare;
 }
 
-/* How far touch k went, squared, and how much it changed since any of the drives. */
+/* The square of the greatest distance that touch k went since any of the drives, and the greatest
+ * change of its strength. */
 static void went(const eits_fast *fast, uint32_t k, eits_real *square, eits_real *change)
 {
     const eits_real *now = fast->state + FAST_SIZE * k;

@@ -1,4 +1,5 @@
-/* What a touch at each cell would explain of drives that wait: where a search begins.
+/* For each cell, how much of the waiting drives' data a touch there would explain. A search begins
+ * with this map.
  *
  * A cell's answer is g = D f, f_e = E_drive . E_e of each electrode, and D the rows' differences.
  * So g'S^-1 e = f . (D'S^-1 e), in which the bracket is the drive's: a cell costs one pass over the

@@ -1,4 +1,4 @@
-/* What a touch does to one drive's rows, from the model's fields (section FLDS).
+/* The answer of one drive's rows to a touch, from the model's fields (section FLDS).
  *
  * A row's datum changes by -volts strength mean(E_drive . E_measure), the mean over a soft disc:
  * each pixel counts (1 - d^2 / rho^2)^2 at a distance d below rho, which has a derivative

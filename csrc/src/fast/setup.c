@@ -1,7 +1,7 @@
 /* Memory of the fast path, and how it begins. */
 #include "fast/fast.h"
 
-/* What the protocol's table says of drives: how many there are, and the most rows of one. */
+/* The number of drives in the protocol's table, and the greatest number of rows of one drive. */
 typedef struct shape {
     uint32_t drives, most_rows;
 } shape;
@@ -171,7 +171,8 @@ eits_status eits_fast_begin(eits_fast *fast)
     fast->frame_s = 0;
     for (uint32_t n = 0; n < EITS_FAST_RING; ++n)
         fast->ring[n]->plain = 0;
-    /* What frames named stays until the next is aligned: one may still be solved meanwhile. */
+    /* The touches that frames named stay until the next frame is aligned, because a frame may still
+     * be being solved meanwhile. */
     fast->fresh = 1;
     for (uint32_t n = 0; n < fast->drives; ++n) {
         /* Nothing is wrong with drives that were not measured yet; the first frame is not held back

@@ -1,4 +1,4 @@
-/* Which model of the touches: discs, ellipses, or one touch as two. */
+/* Decide which model describes the touches: discs, ellipses, or one touch as two. */
 #include "joint/joint.h"
 
 #include "joint/constants.h"

@@ -1,11 +1,11 @@
-/* What the skin answers to a disc, and what of the grid a disc covers.
+/* The answer of the skin to a disc, and the part of the grid that a disc covers.
  *
  * The image is a sum of pixels, but a finger is neither square nor on the grid. A disc of uniform
  * change covers pixels wholly, partly or not; its answer is the sum of S's columns by these covers,
  * so a touch can lie between pixels and its place can be found to a fraction of one. The cover of a
  * pixel is clamp(1/2 + (radius - distance) / pixel, 0, 1), exact for a straight edge parallel to
- * the pixel's side and continuous in place and radius. That continuity is what the fit lives on:
- * with covers of 0 and 1 the residual would be a staircase, and its derivative zero or infinite.
+ * the pixel's side and continuous in place and radius. The fit needs that continuity: with covers
+ * of 0 and 1 the residual would be a staircase, and its derivative would be zero or infinite.
  *
  *     atom  = Q F S (c / w),      w the column weights, c the covers: the answer to 1 S/m
  *     slope = Q F S (dc / w),     dc / dx = ramp (x_pixel - x) / distance / pixel, and so on
@@ -127,7 +127,7 @@ static uint64_t respond(eits_context *ctx, const covered *c, const eits_real *va
     return (uint64_t)c->count * ctx->model->rank + eits_forward(ctx, out);
 }
 
-/* Only the pixels under the rim, whose cover changes. */
+/* Keep only the pixels under the rim, whose cover changes. */
 static void keep_rim(covered *c)
 {
     uint32_t kept = 0;
@@ -232,8 +232,8 @@ eits_real eits_disc_area(const eits_context *ctx, const eits_disc *disc)
     return pixels * pixel * pixel;
 }
 
-/* Nine cells around the centre suffice: a disc whose centre is further from the skin than that
- * is no touch, however large. */
+/* Nine cells around the centre suffice: a disc whose centre is further from the skin than that is
+ * not a touch, however large it is. */
 int eits_disc_on_skin(const eits_context *ctx, const eits_disc *disc)
 {
     const eits_model *model = ctx->model;

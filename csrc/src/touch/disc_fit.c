@@ -2,8 +2,8 @@
  *
  *     minimise |data - sum_k change_k atom(x_k, y_k, r_k)|^2 + sum_k weight_k (r_k - expected_k)^2
  *
- * with change_k of the sign of its peak. The image cannot say this: it is sparse by its lambda, so
- * its peaks are narrower and weaker than the touch and sit on pixels.
+ * with change_k of the sign of its peak. The image cannot give these numbers: its lambda makes it
+ * sparse, so its peaks are narrower and weaker than the touch and lie on pixels.
  *
  * Method: Gauss and Newton's steps with Levenberg and Marquardt's damping (Marquardt, J. Soc.
  * Indust. Appl. Math. 11 (1963) 431, doi 10.1137/0111030), one disc at a time, the others held.
@@ -43,7 +43,7 @@ eits_real eits_fit_left(const eits_context *ctx, const eits_fit *f)
     return eits_dot(ctx->kernels, f->residual, f->residual, ctx->model->rank);
 }
 
-/* The projection of `target` on the atom; of the wrong sign it is no touch. */
+/* The projection of `target` on the atom. A projection of the wrong sign is not a touch. */
 eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const eits_real *atom,
                            const eits_real *target)
 {
@@ -53,8 +53,8 @@ eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const
     return change * disc->polarity > 0 ? change : 0;
 }
 
-/* From zero each time: strengths of an earlier set of discs are no start, and ten passes over at
- * most sixteen atoms cost less than one atom. */
+/* The strengths begin at zero each time: strengths of an earlier set of discs are not a good start,
+ * and ten passes over at most sixteen atoms cost less than one atom. */
 void eits_fit_strengths(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     const uint32_t rank = ctx->model->rank;

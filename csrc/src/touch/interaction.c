@@ -1,4 +1,5 @@
-/* What touches do to each other's data, taken out to second order (interaction.h has the physics).
+/* The effect of touches on each other's data is taken out to second order (interaction.h has the
+ * physics).
  *
  * The Jacobian is linear: two touches give the sum of what each gives alone. In truth each lies in
  * the field that the other has changed. For strong touches near each other that
@@ -35,8 +36,8 @@ static complex_number product(complex_number a, complex_number b)
                             eits_fma(a.re, b.im, a.im * b.re)};
 }
 
-/* 1 / a^2; 0 where a is all but zero: discs in one place have no field at each other that a dipole
- * would tell. */
+/* 1 / a^2, or 0 where a is all but zero: a dipole does not describe the field that discs in one
+ * place have at each other. */
 static complex_number inverse_square(complex_number a)
 {
     const eits_real square = eits_fma(a.re, a.re, a.im * a.im);
@@ -62,8 +63,8 @@ eits_real eits_disc_moment(const eits_context *ctx, const eits_disc *disc)
     return disc->change * PI * eits_fma(disc->radius_mm, disc->radius_mm, pixel * pixel / 12);
 }
 
-/* What disc j, in `source`, adds to the field of each electrode's current at disc i: into `bent`, L
- * numbers for x, then L for y, as the fields are.
+/* Add to `induced` the field that disc j, in the field `source`, adds to the field of each
+ * electrode's current at disc i: L numbers for x, then L for y, as the fields are.
  *
  * A dipole's field in the plane is 1 / z^2 in complex numbers, its mirror in a circle likewise,
  * so each pair of discs costs two complex factors and then two multiply-adds per electrode. Only
@@ -98,7 +99,8 @@ static void add_induced(const eits_context *ctx, const eits_disc *i, const eits_
     }
 }
 
-/* Add to each fold's `sum` what disc `i` answers to the `bent` field, measured in its own. */
+/* Add to each fold's `sum` the answer of disc `i` to the field `induced`, measured in its `own`
+ * field. */
 static void answer(const eits_context *ctx, const eits_disc *i, const eits_real *own,
                    const eits_real *induced, eits_real *sum)
 {

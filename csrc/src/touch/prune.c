@@ -1,4 +1,4 @@
-/* Which discs are touches: backward elimination.
+/* Backward elimination decides which discs are touches.
  *
  * The image has more peaks than touches: ripple around a strong one, noise, a second peak of one
  * wide touch near the rim. A disc stays if the data are worse without it by enough (a fraction
@@ -18,8 +18,8 @@
 #include "kernels/column.h"
 #include "kernels/kernels.h"
 
-/* What each disc alone explains: change^2 / (G^-1)_kk of the atoms' Gram matrix G, by Cholesky and
- * its inverse. */
+/* The part of the data that each disc alone explains: change^2 / (G^-1)_kk of the atoms' Gram
+ * matrix G, by its Cholesky factor and the factor's inverse. */
 void eits_fit_explain(eits_context *ctx, eits_fit *f)
 {
     const uint32_t rank = ctx->model->rank, n = f->count;

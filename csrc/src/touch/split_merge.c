@@ -25,7 +25,7 @@ static eits_real lesser(eits_real a, eits_real b)
     return a < b ? a : b;
 }
 
-/* How far apart two discs' edges are, in the smaller radius. */
+/* The distance between two discs' edges, in units of the smaller radius. */
 static eits_real edge_distance(const eits_disc *a, const eits_disc *b)
 {
     const eits_real dx = a->x_mm - b->x_mm, dy = a->y_mm - b->y_mm;
