@@ -680,6 +680,22 @@ TEST(test_a_touch_that_no_row_shows)
     check_reported(b, 0.3);
 }
 
+/* A finger that rests does not jump, whatever would explain a few drives. A young one may. */
+TEST(test_a_touch_that_rests_does_not_jump)
+{
+    for (uint32_t rests = 0; rests < 2; ++rests) {
+        bench *b = bench_open(EITS_SIGN_INCREASE);
+        eits_fast_touch touches[EITS_FAST_TOUCHES];
+        drives(b, 8);
+        put(b, 0, 20, 11, 1);
+        drives(b, rests ? 80 : 16);
+        put(b, 0, 29, 11, 1);
+        drives(b, 12);
+        CHECK_EQUAL(reported(b, touches), 1);
+        CHECK_NEAR(touches[0].x_mm, rests ? 20 : 29, 1);
+    }
+}
+
 /* The first finger may be reported by the first drive that shows it clearly; one beside a known
  * finger, which might have moved, must come out of two searches. Lifted, each goes alone. */
 TEST(test_fingers_land_one_after_another_and_lift)

@@ -297,7 +297,11 @@
  * smaller: still touches are dragged */
 #define EITS_FAST_CREEPS_MM R(0.5)
 
-/* in this many drives in a row, becomes a moving one [drives]. as FAST_CREEPS_MM */
+/* a moving touch that moves by less than this from scan to scan [mm]. larger: slow fingers lag;
+ * smaller: still touches keep a speed, and are dragged */
+#define EITS_FAST_RESTS_MM R(0.8)
+
+/* in this many drives in a row, becomes a moving one, or a still one [drives]. as FAST_CREEPS_MM */
 #define EITS_FAST_CREEPS 16
 
 /* a soft disc that ends at this radius or further out is a palm [mm]. between FAST_RHO_WIDE_MM and

@@ -53,7 +53,8 @@ typedef struct fast_known {
     fast_last last;
     eits_real place[2];
     uint32_t place_us;
-    uint32_t creeps; /* consecutive drives in which it had moved the same way since the last scan */
+    uint32_t creeps; /* consecutive drives in which it had moved the same way since the last scan;
+                        if it moves, in which it had not */
     eits_real anchor[2]; /* its place `slow` drives ago; for a still touch, its displacement since
                             the last scan */
     eits_real energy;    /* mean of the chi^2 per drive that it explains */

@@ -296,14 +296,23 @@ static int look(eits_fast *fast, uint32_t drive, const eits_real *volts)
     return take_news(fast, drive, used, chi2, news, !calm);
 }
 
-/* A touch that moves but has stayed in place for some drives is still. Its speed alone would not
- * tell: it follows noise. */
-static void slow_down(eits_fast *fast, uint32_t k)
+/* A touch that moves but has stayed in place for some drives is still, and so is one that lay near
+ * where the same drive had it a scan before, in as many drives on end as make a still touch move.
+ * `then` is where that was, NULL if it was not there. The model's error differs from drive to drive
+ * and moves a still touch to and fro within a scan. Its speed alone would not tell: it follows
+ * noise. */
+static void slow_down(eits_fast *fast, uint32_t k, const eits_real *then)
 {
     fast_known *known = &fast->known[k];
     const eits_real *place = fast->state + FAST_SIZE * k;
     if (!known->moving || fast->held_count > 0)
         return;
+    const int same = then != NULL && fast_distance2(then, place) < fast_square(EITS_FAST_RESTS_MM);
+    known->creeps = same ? known->creeps + 1 : 0;
+    if (known->creeps > EITS_FAST_CREEPS) {
+        eits_fast_still(fast, k);
+        return;
+    }
     if (known->slow == 0)
         eits_copy(known->anchor, place, 2);
     if (++known->slow <= EITS_FAST_SLOW_DRIVES)
@@ -365,7 +374,7 @@ static void update_known(eits_fast *fast, const fast_drive *d, uint32_t there)
         known->off_drives = known->on ? 0 : known->off_drives + 1;
         if (known->off_drives > EITS_FAST_GONE)
             known->peak -= known->peak / EITS_FAST_FORGETS;
-        slow_down(fast, k);
+        slow_down(fast, k, (there >> k & 1u) != 0 ? d->then[k] : NULL);
         if (!known->moving && known->on && (there >> k & 1u) != 0)
             speed_up(fast, k, d->then[k]);
         const int gone = known->off_drives > EITS_FAST_GONE && !creeps(fast, known);

@@ -249,7 +249,7 @@ void eits_fast_put_on(eits_fast *fast, uint32_t k)
 void eits_fast_still(eits_fast *fast, uint32_t k)
 {
     const uint32_t at = FAST_SIZE * k, n = FAST_SIZE * fast->count;
-    fast->known[k].moving = fast->known[k].slow = 0;
+    fast->known[k].moving = fast->known[k].slow = fast->known[k].creeps = 0;
     for (uint32_t speed = at + FAST_VX; speed <= at + FAST_VY; ++speed) {
         fast->state[speed] = 0;
         eits_zero(fast->p[speed], n);

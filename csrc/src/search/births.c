@@ -59,12 +59,25 @@ static void swap(eits_fast *fast, fast_which a, fast_which b)
     *search_trial(fast, b) = *next;
 }
 
+static int all_rest(const eits_fast *fast)
+{
+    for (uint32_t k = 0; k < fast->count; ++k) {
+        if (!search_rests(fast, k))
+            return 0;
+    }
+    return fast->count > 0;
+}
+
+/* Beside touches that rest, what explained the drives of the last search is looked at first: the
+ * map's peak may lie elsewhere, and known touches would seem to have moved. */
 static void look_for_one(eits_fast *fast)
 {
     fast_search *s = &fast->search;
     eits_real from[2];
     if (!eits_fast_peak(fast, fast->score, NULL, 0, s->peak))
         return;
+    if (s->warm_explains && s->decisions - s->warm_at <= 1 && all_rest(fast))
+        eits_copy(s->peak, s->warm[0], 2);
     eits_copy(from, s->peak, 2);
     warmer(fast, from);
     start(fast, from, s->count, 2, search_trial(fast, FAST_ONE));
@@ -99,6 +112,7 @@ static void end_rival(eits_fast *fast)
             eits_copy(s->warm[s->warm_count++], s->trial[FAST_ONE + n].body[0].p, 2);
     }
     s->warm_at = s->decisions;
+    s->warm_explains = (uint32_t)eits_is_noise(fast, one, 1);
     one->lead = one->all - one->left;
     if (rival->exists && fast_apart(rival->body[0].p, one->body[0].p) &&
         rival->left - one->left < one->lead)

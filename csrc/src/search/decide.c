@@ -219,6 +219,10 @@ int eits_decide(eits_fast *fast)
     cost_births(fast);
     trial[FAST_MOVE].cost =
         trial[FAST_MOVE].left + trial[FAST_MOVE].change + 4 * (eits_real)trial[FAST_MOVE].bodies;
+    const fast_trial *instead = &trial[FAST_REPLACE];
+    if (instead->exists && search_rests(fast, instead->gone) &&
+        instead->rho2 == fast->known[instead->gone].rho2)
+        trial[FAST_REPLACE].exists = 0;
     if (trial[FAST_REPLACE].exists)
         trial[FAST_REPLACE].cost += 6 + (fast_is_palm(trial[FAST_REPLACE].rho2) ? 0 : 2 * drives);
     eits_real least;

@@ -34,7 +34,8 @@ void eits_trial_add_known(const eits_fast *fast, fast_trial *trial, uint32_t k)
     const eits_real late = fast_between_s(fast->ring[fast->search.from]->time_us,
                                           search_drive(fast, trial, 0)->time_us);
     const eits_real offset = EITS_FAST_MOVE_MM + R(0.3) * EITS_FAST_MOVE_SPEED * late;
-    const eits_real speed = fast->known[k].moving ? EITS_FAST_TURN_SPEED : EITS_FAST_MOVE_SPEED;
+    const int turns = fast->known[k].moving || search_rests(fast, k);
+    const eits_real speed = turns ? EITS_FAST_TURN_SPEED : EITS_FAST_MOVE_SPEED;
     trial->body[trial->bodies++] =
         (fast_body){.known = (uint8_t)k,
                     .numbers = 4,

@@ -48,6 +48,15 @@ static inline uint32_t search_last(const eits_fast *fast, uint32_t most)
     return fast->search.count < most ? fast->search.count : most;
 }
 
+/* Whether a known touch has been in place for long. A finger that rests neither jumps nor begins to
+ * slide as fast as a swipe, but a finger that lands beside it can look like that. */
+static inline int search_rests(const eits_fast *fast, uint32_t k)
+{
+    const fast_known *known = &fast->known[k];
+    return known->on && !known->moving && known->age > EITS_FAST_YOUNG &&
+           !fast_is_palm(known->rho2);
+}
+
 /* Return the cost of a look at `bodies` of the trial, in answers. If the known touches are where
  * they were, their answers are in the ring already, and only the equations are computed. */
 static inline uint32_t search_cost(const fast_trial *trial, uint32_t bodies)

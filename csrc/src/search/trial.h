@@ -95,6 +95,8 @@ typedef struct fast_search {
     eits_real peak[2];     /* greatest cell of the map, mm */
     eits_real warm[2][2], pair[2][2]; /* places that the last searches found */
     uint32_t warm_at, warm_count, pair_at, pair_known;
+    uint32_t warm_explains; /* whether the first of them left the last search's drives no more than
+                               noise */
     /* the new touches that the last decision would have added */
     eits_real last[FAST_NEW][2];
     uint32_t last_count, last_times, last_at;
