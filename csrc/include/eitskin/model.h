@@ -27,7 +27,6 @@ extern "C" {
 /* A file of another major version is rejected. In a file of a later minor version, new sections are
  * skipped. */
 #define EITS_MODEL_MAJOR          1
-#define EITS_MODEL_MINOR          10
 #define EITS_MODEL_ALIGNMENT      16
 #define EITS_MAX_RANK             1024
 #define EITS_MAX_PLACE_ROWS       32
