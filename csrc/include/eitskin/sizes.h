@@ -150,8 +150,7 @@ extern "C" {
     ARRAY(joint.drift, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                            \
     ARRAY(joint.rest, eits_real, EITS_JOINT_IF(n_electrodes, n_folded))                             \
     ARRAY(joint.column, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_PARAMETERS * EITS_JOINT_BLOCK)) \
-    ARRAY(joint.left, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_BLOCK))                    \
-    ARRAY(joint.along, eits_real, EITS_JOINT_IF(n_electrodes, (EITS_JOINT_PARAMETERS + 1u) * EITS_JOINT_NUISANCES)) \
+    ARRAY(joint.along, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_PARAMETERS * EITS_JOINT_NUISANCES)) \
     ARRAY(joint.nuisance, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_NUISANCES * (EITS_JOINT_NUISANCES + 1u) / 2u)) \
     ARRAY(joint.normal, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_TRIANGLE))               \
     ARRAY(joint.factor, eits_real, EITS_JOINT_IF(n_electrodes, EITS_JOINT_TRIANGLE))               \

@@ -234,9 +234,8 @@ typedef struct eits_joint_memory {
     eits_real *weight; /* n_folded: 1 / sigma; 0 for a fold that is left out */
     eits_real *drift;  /* n_folded: the direction of the gain's drift in that metric, of length 1 */
     eits_real *rest;   /* n_folded: the residual of the held shapes (eits_joint_hold) */
-    eits_real *left;   /* EITS_JOINT_BLOCK: what the last evaluation left of a block, weighed */
     eits_real *column; /* EITS_JOINT_PARAMETERS x EITS_JOINT_BLOCK */
-    eits_real *along;  /* (EITS_JOINT_PARAMETERS + 1) x EITS_JOINT_NUISANCES: last, the data's */
+    eits_real *along;  /* EITS_JOINT_PARAMETERS x EITS_JOINT_NUISANCES */
     eits_real *nuisance; /* their factor L, packed by rows (joint/metric.c) */
     uint32_t errors;     /* vectors of the model's errors in use */
     eits_real error_unit;

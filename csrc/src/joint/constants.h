@@ -251,11 +251,6 @@
 /* ---- Chosen: by hand: bounds within which the linearisation holds, and when to stop. Check:
  * scripts/test tests/python/acceptance/test_joint_fit.py */
 
-/* a step whose fall is so near to the predicted one is followed by a step with the same slopes [of
- * the predicted fall]. larger: slopes are too old, and pairs count as one; smaller: more slopes are
- * made */
-#define EITS_JOINT_FOLLOWS R(0.1)
-
 /* the most Gauss-Newton steps of one descent. larger: more work in hard frames; smaller: fingers
  * are not settled */
 #define EITS_JOINT_STEPS 14

@@ -31,8 +31,11 @@ static const eits_poles *poles_of(const eits_joint *j)
     return round ? &DISCS : &ELLIPSES;
 }
 
-/* The products of column `a` with what no touch causes, or of what is left. */
-enum { OF_DATA = MAX_PARAMETERS };
+/* Sums over blocks of folds. */
+typedef struct sums {
+    eits_real square;                      /* of what is left */
+    eits_real along[EITS_JOINT_NUISANCES]; /* its products with what no touch causes */
+} sums;
 
 static eits_real *along_of(eits_context *ctx, uint32_t a)
 {
@@ -72,10 +75,10 @@ static int holds(const eits_joint *j)
 /* What the free shapes leave of one block, weighed, and their columns into the normal equations,
  * behind them the answers of `further` discs. */
 static uint64_t add_block(eits_context *ctx, const eits_joint *j, int slopes, uint32_t further,
-                          uint32_t first, uint32_t count, eits_real *square)
+                          uint32_t first, uint32_t count, sums *s)
 {
     eits_joint_memory *m = &ctx->joint;
-    eits_real value[BLOCK], *left = m->left;
+    eits_real value[BLOCK], left[BLOCK];
     uint64_t macs = 4u * (uint64_t)count;
     eits_copy(left, (holds(j) ? m->rest : ctx->frame.d) + first, count);
     for (uint32_t free = 0; free < j->free_count; ++free) {
@@ -91,8 +94,8 @@ static uint64_t add_block(eits_context *ctx, const eits_joint *j, int slopes, ui
     }
     for (uint32_t i = 0; i < count; ++i)
         left[i] *= m->weight[first + i];
-    *square += eits_dot(ctx->kernels, left, left, count);
-    eits_joint_add_along(ctx, left, 1, first, count, along_of(ctx, OF_DATA));
+    s->square += eits_dot(ctx->kernels, left, left, count);
+    eits_joint_add_along(ctx, left, 1, first, count, s->along);
     uint32_t n = slopes ? j->free_count * j->parameters : 0;
     for (uint32_t k = j->count; k < j->count + further; ++k) {
         const eits_pole_out out = {.value = m->column + (size_t)BLOCK * n++};
@@ -141,44 +144,24 @@ uint64_t eits_joint_restore(eits_context *ctx, const eits_joint *j, uint32_t k)
     return macs + eits_pole_induced_in(ctx, j->shape, j->count, &k, 1, &ELLIPSES, 2);
 }
 
-/* What no touch causes out of the gradient by parameter `a`, and its prior into it. */
-static void finish_gradient(eits_context *ctx, const eits_shape *shape, uint32_t p, uint32_t a)
-{
-    eits_real *gradient = &ctx->joint.gradient[a];
-    *gradient -= product(ctx, along_of(ctx, a), along_of(ctx, OF_DATA));
-    *gradient =
-        eits_fma(-eits_joint_precision(shape, p), eits_joint_offset(ctx, shape, p), *gradient);
-}
-
 /* What no touch causes out of the normal equations, and the priors into them. */
-static void finish_normal(eits_context *ctx, const eits_joint *j, uint32_t further)
+static void finish_normal(eits_context *ctx, const eits_joint *j, uint32_t further, const sums *s)
 {
     eits_joint_memory *m = &ctx->joint;
     const uint32_t n = j->free_count * j->parameters;
     for (uint32_t a = 0; a < n + further; ++a) {
         const uint32_t p = a < n ? a % j->parameters : 0; /* further discs have no prior */
         const eits_shape *shape = &j->shape[a < n ? j->free[a / j->parameters] : 0];
+        const eits_real prior = eits_joint_precision(shape, p);
         eits_real *row = eits_lower_row(m->normal, a), *along = along_of(ctx, a);
         eits_joint_finish_along(ctx, along);
-        finish_gradient(ctx, shape, p, a);
+        m->gradient[a] -= product(ctx, along, s->along);
+        m->gradient[a] = eits_fma(-prior, eits_joint_offset(ctx, shape, p), m->gradient[a]);
         for (uint32_t b = 0; b <= a; ++b)
             row[b] -= product(ctx, along, along_of(ctx, b));
-        row[a] += eits_joint_precision(shape, p);
+        row[a] += prior;
     }
     m->is_known = 0;
-}
-
-/* The gradient about *j, which was evaluated last, with the slopes of shapes near by. Returns the
- * multiply-accumulates. */
-static uint64_t follow(eits_context *ctx, const eits_joint *j)
-{
-    eits_joint_memory *m = &ctx->joint;
-    const uint32_t folds = ctx->model->n_folded, n = j->free_count * j->parameters;
-    for (uint32_t a = 0; a < n; ++a) {
-        m->gradient[a] = eits_dot(ctx->kernels, m->column + (size_t)BLOCK * a, m->left, folds);
-        finish_gradient(ctx, &j->shape[j->free[a / j->parameters]], a % j->parameters, a);
-    }
-    return (uint64_t)n * (folds + m->errors);
 }
 
 /* The polynomial of shape k's field; a shape that would reach beyond the rim is made as small as it
@@ -203,7 +186,9 @@ static uint64_t evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds, int 
     eits_joint_memory *m = &ctx->joint;
     const uint32_t folds = ctx->model->n_folded,
                    n = (slopes ? j->free_count * j->parameters : 0) + further;
-    eits_real square = 0, *along = along_of(ctx, OF_DATA);
+    sums s;
+    s.square = 0;
+    eits_zero(s.along, 1u + m->errors);
     uint64_t macs = 0;
     for (uint32_t k = 0; k < j->free_count && rounds > 0; ++k)
         macs += bring_home(ctx, j->free[k], &j->shape[j->free[k]]);
@@ -211,19 +196,18 @@ static uint64_t evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds, int 
         eits_pole_induced_in(ctx, j->shape, j->count, j->free, j->free_count, poles_of(j), rounds);
     eits_zero(m->normal, EITS_LOWER_SIZE(n));
     eits_zero(m->gradient, n);
-    eits_zero(along, 1u + m->errors);
     for (uint32_t a = 0; a < n; ++a)
         eits_zero(along_of(ctx, a), 1u + m->errors);
     for (uint32_t first = 0; first < folds; first += BLOCK) {
         const uint32_t count = folds - first < BLOCK ? folds - first : BLOCK;
-        macs += add_block(ctx, j, slopes, further, first, count, &square);
+        macs += add_block(ctx, j, slopes, further, first, count, &s);
     }
-    j->left = eits_fma(-along[0], along[0], square);
-    eits_joint_finish_along(ctx, along);
-    j->misfit = square - product(ctx, along, along);
+    j->left = eits_fma(-s.along[0], s.along[0], s.square);
+    eits_joint_finish_along(ctx, s.along);
+    j->misfit = s.square - product(ctx, s.along, s.along);
     j->cost = j->misfit + eits_joint_priors(ctx, j);
     if (slopes) {
-        finish_normal(ctx, j, further);
+        finish_normal(ctx, j, further, &s);
         m->evaluated = macs;
     }
     return macs;
@@ -370,7 +354,6 @@ void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, u
 {
     const uint32_t n = j->free_count * j->parameters;
     eits_real damping = EITS_JOINT_DAMPING;
-    int follows = 0; /* whether the slopes are those of shapes before */
     for (uint32_t step = 0; step < EITS_JOINT_STEPS; ++step) {
         eits_real d[MAX_PARAMETERS];
         factor(ctx, n, damping);
@@ -385,18 +368,13 @@ void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, u
         eits_joint trial = moved(ctx, j, d);
         *macs += evaluate(ctx, &trial, 1, 0, 0) + (uint64_t)n * n * (n + 6u) / 6u;
         const eits_real fallen = j->cost - trial.cost;
-        const eits_real off = eits_fabs(predicted - fallen);
         if (fallen > 0) {
             *j = trial;
             ctx->joint.is_known = 0;
             damping *= EITS_JOINT_DAMP_LESS;
-            if (off < EITS_JOINT_AS_PREDICTED * eits_joint_excess(ctx, j))
+            if (eits_fabs(predicted - fallen) < EITS_JOINT_AS_PREDICTED * eits_joint_excess(ctx, j))
                 return;
-            follows = ctx->model->n_folded <= BLOCK && off < EITS_JOINT_FOLLOWS * predicted;
-            *macs += follows ? follow(ctx, j) : evaluate(ctx, j, 0, 1, 0);
-        } else if (follows) {
-            *macs += evaluate(ctx, j, 1, 1, 0);
-            follows = 0;
+            *macs += evaluate(ctx, j, 0, 1, 0);
         } else /* again, a shorter step */
             damping = eits_larger(EITS_JOINT_DAMP_MORE * damping, EITS_JOINT_DAMPED);
     }
