@@ -153,15 +153,6 @@ def test_close_touches_of_a_crowd_are_counted():
     assert max(matched.distances_mm) < 2
 
 
-def test_two_close_touches_are_not_taken_for_one():
-    """They are 14.7 mm apart. They were one touch when F had to fall by 25, and the misfit had to
-    exceed its expectation by 20, before one became two."""
-    pair = (TrueTouch(-2.9, 36.7, 5.8, 7.9), TrueTouch(-2.2, 22.0, 7.0, 6.6))
-    matched = found_in(measured(TouchScene("pair", pair), 0))
-    assert matched.exact
-    assert max(matched.distances_mm) < 4
-
-
 # Places of weights, x and y in mm, as `eitskin study paper` puts them one after another: their
 # middles are 6 mm from the rim.
 AT_RIM = (
