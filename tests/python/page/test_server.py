@@ -366,7 +366,7 @@ def test_a_real_board_is_not_pressed_and_has_no_timeline(monkeypatch):
         assert not answer["ok"] and "only the skin of  sim:  can be pressed" in answer["text"]
         line.send(json.dumps({"type": "do", "do": "seek", "value": 1}))
         answer = reported(line, "answer")
-        assert not answer["ok"] and "is no recording" in answer["text"]
+        assert not answer["ok"] and "is not a recording" in answer["text"]
 
 
 def test_a_recording_needs_the_token_and_must_be_there(server):

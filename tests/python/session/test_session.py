@@ -136,5 +136,5 @@ def test_a_recording_goes_on_where_it_is_asked_to(tmp_path):
 
 
 def test_only_a_recording_goes_on_elsewhere():
-    with Session("sim:swipe") as session, pytest.raises(UsageError, match="is no recording"):
+    with Session("sim:swipe") as session, pytest.raises(UsageError, match="is not a recording"):
         session.seek(1.0)
