@@ -78,16 +78,22 @@ def test_touches_and_images_are_the_host_s_to_the_bit(image):
     board = power_up(image)
     device = connect(board)
     check, seen, host = twin_check(device, load_prebuilt()[1], 6, untouched=16)
-    assert (check.same, check.different, check.inconclusive, check.alone) == (6, [], 0, 0)
-    assert check.images == check.touches == 6
+    # touches that take longer than a scan cost the next frame, and the one after it has no frame
+    # before it to compare with
+    assert (check.different, check.alone) == ([], 0) and check.inconclusive <= 1
+    assert check.same + check.inconclusive == 6
+    assert check.images == check.touches == check.same
     assert sum(result is not None for result in host) >= 4
+    unsolved = 0
     for frame, result in zip(seen, host, strict=True):
         assert frame.info is not None
-        assert (result is None) == frame.info.unsolved
         if result is None:  # touches landed in its scan: it has those that drives follow
+            unsolved += frame.info.unsolved
             continue
+        assert not frame.info.unsolved
         reported = frame.info.macs, frame.info.iterations
         assert reported == (result.info.macs, result.info.iterations)
+    assert unsolved + check.inconclusive == sum(result is None for result in host)
     truth = np.array([[-40.0, 10.0], [30.0, -25.0]])
     for frame in seen[2:]:
         assert frame.touches is not None
