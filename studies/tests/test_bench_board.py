@@ -47,15 +47,15 @@ def test_images(result):
 
 
 def test_the_rate_of_the_emulated_board(cortex_m7):
-    """No frame comes before its rows are measured. The scene's first three frames need about 9 ms
-    each; from the fourth on, the fit of the touches makes most frames cost more than the scan."""
+    """No frame comes before its rows are measured, and none waits for longer than the slowest solve
+    and a little for the link."""
     _, blob = bench_board.load_prebuilt()
     image = cortex_m7 / "firmware" / f"{bench_board.IMAGE}.bin"
     rate = bench_board.measure_rate(blob, "f32", image, 0, 8)
     assert (rate.rows, rate.samples, rate.acquire_us) == (104, 80, 10_400)
     assert 4000 < rate.solve_us_p50 <= rate.solve_us_worst < 25_000
     slowest_us = max(rate.solve_us_worst, rate.acquire_us)
-    assert 1e6 / slowest_us <= rate.rate_hz <= 1e6 / rate.acquire_us
+    assert 0.98e6 / slowest_us <= rate.rate_hz <= 1e6 / rate.acquire_us
     assert rate.bound == ("solve" if rate.solve_us_p50 > 10_400 else "acquisition")
     assert 1000 < rate.stack_used < 16384
 
