@@ -66,8 +66,9 @@ class Parser(argparse.ArgumentParser):
             message += nearest(found["given"], known)
         unknown = UNKNOWN.match(message)
         if unknown and not REPLACED.match(message):
-            known = [word for word in _options_of(self) if word.startswith("--")]
-            close = nearest(unknown["option"], known)
+            given = unknown["option"]
+            known = [word for word in _options_of(self) if word.startswith("--") and word != given]
+            close = nearest(given, known)
             message += f"; {close}" if close.startswith("did you mean") else ""
         if REPLACED.match(message):
             message += "; use --preset, or a model of  eitskin recommend -o MODEL.eitm"

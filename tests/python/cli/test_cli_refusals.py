@@ -38,6 +38,10 @@ def test_arguments_that_cannot_be_parsed(refused, arguments, text):
     assert text in line and line.endswith("--help")
 
 
+def test_an_option_of_another_command_is_not_suggested_as_itself(refused):
+    assert "mean '--paper'" not in refused(USAGE, "model info x.eitm --paper")
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_help(command, capsys):
     with pytest.raises(SystemExit) as end:
