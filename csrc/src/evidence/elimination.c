@@ -7,8 +7,8 @@
  * data fit worse than they should. So a touch needs more evidence where the model is wrong by more
  * than it says.
  *
- * Where no more columns may be made, the linearisation alone decides: the discs that it can do
- * without are left out.
+ * If the limit of columns is reached, the linearisation alone decides, and leaves out the discs
+ * that it does not need.
  */
 #include "evidence/verdict.h"
 

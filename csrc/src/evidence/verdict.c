@@ -1,5 +1,5 @@
-/* One linearisation tells of each disc of an answer the rise of F without it, its place and its
- * shape. */
+/* One linearisation of an answer gives, for each of its discs, the rise of F without that disc, its
+ * place and its shape. */
 #include "evidence/verdict.h"
 
 #include "base/vec.h"

@@ -131,7 +131,7 @@ struct eits_fast {
         kept_used; /* ids kept at the last alignment; kept_used: 1: one of them was given */
     fast_seen seen[EITS_MAX_TOUCHES];
     eits_fast_touch followed[EITS_FAST_MAX_TOUCHES];
-    /* the places of those that were off, of which the solver may find what the skin keeps */
+    /* the places of the touches that were off; there the solver may find what the skin keeps */
     uint32_t n_off;
     eits_real off_at[EITS_FAST_MAX_TOUCHES][2];
     /* touches that drives may find again: their ids, their places, and which were found */

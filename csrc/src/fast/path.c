@@ -347,11 +347,12 @@ static void speed_up(eits_fast *fast, uint32_t k, const eits_real *then)
     }
 }
 
-/* A touch that lifts may leave a part of its signal, which fades in seconds: the skin creeps. It is
- * followed as a touch that is off, so that it is not found as a new touch. What has not faded when
- * its peak is forgotten is a finger that presses lightly. A touch that was there for less time may
- * have been a wrong place, at the rim of a palm. */
-static int creeps(const eits_fast *fast, const fast_known *known)
+/* Whether a touch that lifted may have left a part of its signal, which fades in seconds because
+ * the skin creeps. Such a touch is still followed, as one that is off, so that what it left is not
+ * found as a new touch. If the signal has not faded when the peak is forgotten, a finger presses
+ * lightly. A touch that was there for a shorter time may have been a wrong place at the rim of a
+ * palm. */
+static int leaves_rest(const eits_fast *fast, const fast_known *known)
 {
     return known->confirmed && known->age > EITS_FAST_WIDENS && known->energy >= EITS_FAST_FAINT &&
            fast->count < EITS_FAST_MAX_TOUCHES;
@@ -377,7 +378,7 @@ static void update_known(eits_fast *fast, const fast_drive *d, uint32_t there)
         slow_down(fast, k, (there >> k & 1u) != 0 ? d->then[k] : NULL);
         if (!known->moving && known->on && (there >> k & 1u) != 0)
             speed_up(fast, k, d->then[k]);
-        const int gone = known->off_drives > EITS_FAST_GONE && !creeps(fast, known);
+        const int gone = known->off_drives > EITS_FAST_GONE && !leaves_rest(fast, known);
         if (gone || !eits_fast_on_skin(fast, state, known->rho2) ||
             !eits_all_finite(state, FAST_SIZE))
             eits_fast_drop(fast, k);

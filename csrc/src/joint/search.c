@@ -1,4 +1,4 @@
-/* Find the number of touches in a crowd, of which the image often shows too few or too many.
+/* Find the number of touches in a crowd. The image often shows too few or too many of them.
  *
  * A touch that the image does not show is sought in what the others leave of the data. They have
  * taken up most of its answer, so that the greatest rest is seldom where it lies. What the touches

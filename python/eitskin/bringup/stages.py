@@ -28,10 +28,8 @@ from eitskin.device.wire.link_table import FaultCode, Setting
 
 RESISTOR_OHM = 1000.0  # of chain and ring
 MOST_NOISE_CODES, MOST_SPAN_CODES = 3.0, 20
-LEVEL_SHARE, RING_SHARE = (
-    0.05,
-    0.06,
-)  # of the predicted value; 1 % resistors and 0.1 % in the source
+# of the predicted value; 1 % resistors and 0.1 % in the source
+LEVEL_SHARE, RING_SHARE = 0.05, 0.06
 LOAD_SHARE = 0.03  # of the source's current, lost on 10 kohm
 SETTLED = 0.01
 FIRST: Row = (0, 1, 0, 1)  # of the chain: over its 1 kohm

@@ -52,9 +52,7 @@ class Request:
     projection: FloatArray
     grid: Grid
     uncertainty: Uncertainty
-    fits_jointly: bool = (
-        False  # whether the model fulfils the conditions of the joint fit of touches
-    )
+    fits_jointly: bool = False  # whether the joint fit of touches works with the model
 
 
 def sensitivity_of(

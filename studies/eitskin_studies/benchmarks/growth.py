@@ -274,7 +274,7 @@ def drawn(result: GrowthTimes) -> dict[str, Any]:
 
 
 def _exponents(points: Sequence[Growth]) -> tuple[float, float]:
-    """Of time and MACs of solve and touches together."""
+    """Return the exponents of the time and of the MACs, of solve and touches together."""
     time = exponent(points, lambda p: p.whole_us)
     return time, exponent(points, lambda p: p.macs + p.touch_macs)
 

@@ -44,7 +44,7 @@ CURVES = {
     "plain FISTA 3000, non-negative": BLACK,
     "eitskin 60, image": BLUE,
     "eitskin 60, touches as discs": BLUE,
-}  # the methods whose curves and images are told apart by eye
+}  # the methods that have a curve and a column of images
 PANEL_INCH = 1.15
 
 

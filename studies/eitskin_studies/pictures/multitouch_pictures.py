@@ -281,7 +281,7 @@ def _trade(axes: Axes, ambiguities: Ambiguities) -> None:
         xlim=(0, 1),
         ylim=(0.3, 1.03),
     )
-    axes.set_title("by the threshold of the score; crosses: crowded", fontsize=9)
+    axes.set_title("any threshold; crosses: crowded", fontsize=9)
     axes.legend(frameon=False, fontsize=7, loc="lower left")
 
 
