@@ -14,9 +14,7 @@ from eitskin.errors import DeviceError
 from eitskin.model.eitm import load_model
 from eitskin.model.model import Model
 from eitskin.model.prebuilt import load_prebuilt
-from eitskin.skin.protocol import Protocol, pattern, pattern_name, pattern_names
-
-MIXED_ELECTRODES = 32  # up to this number, different drive and measuring patterns are also tried
+from eitskin.skin.protocol import Protocol, pattern_name, patterns_of_length
 
 FLASH = "flash this version's firmware with  eitskin flash"
 
@@ -81,15 +79,8 @@ def no_answer(link: Link, before: LinkCounters, what: str, waited_s: float) -> s
 
 def scanned(info: BoardInfo) -> Protocol | None:
     """Return the pattern's protocol that has the hash of the board's, or None."""
-    names = pattern_names(info.n_electrodes)
-    named: list[tuple[str, str | None]] = [(name, None) for name in names]
-    if info.n_electrodes <= MIXED_ELECTRODES:
-        named += [(drive, measure) for drive in names for measure in names]
-    for drive, measure in named:
-        made = pattern(info.n_electrodes, drive, measure)
-        if made.n_rows == info.n_rows and made.hash == info.protocol_hash:
-            return made
-    return None
+    made = patterns_of_length(info.n_electrodes, info.n_rows)
+    return next((one for one in made if one.hash == info.protocol_hash), None)
 
 
 def scanned_pattern(info: BoardInfo) -> str:

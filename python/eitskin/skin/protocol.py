@@ -14,7 +14,7 @@ pairs (e, e + n + 1), opposite pairs (e, e + half the electrodes).
 
 import re
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import gcd, isfinite
 from typing import Any
@@ -33,6 +33,7 @@ KINDS = ("adjacent", "skip-N", "opposite", "skip", "table")
 PATTERNS_HELP = "adjacent, skip-1, skip-2, ..., or opposite"
 SKIP = re.compile(r"skip-(-?\d{1,3})")
 MIN_INDEPENDENT = 3  # rows: the place and the strength of one touch
+MIXED_ELECTRODES = 32  # up to this number, patterns that measure otherwise than they drive are made
 MAX_GRAM_ROWS = 3000  # folded rows whose independence is computed, within a few seconds
 DEFAULT_CURRENT_A = 1e-3
 MAX_ROWS = 0xFFFF
@@ -212,6 +213,25 @@ def pattern_names(n: int) -> tuple[str, ...]:
     """Return the patterns that are possible for ``n`` electrodes, narrow pairs first."""
     skips = tuple(f"skip-{k}" for k in range(1, (n - 1) // 2))
     return ("adjacent", *skips, *(("opposite",) if n % 2 == 0 and n >= 6 else ()))
+
+
+def patterns_of_length(n: int, n_rows: int) -> Iterator[Protocol]:
+    """Yield the different protocols of ``n_rows`` rows that patterns make, each once: first those
+    that measure as is usual for their drives, then, up to ``MIXED_ELECTRODES`` electrodes, every
+    other combination of a drive and a measuring pattern."""
+    names = pattern_names(n)
+    named: list[tuple[str, str | None]] = [(name, None) for name in names]
+    if n <= MIXED_ELECTRODES:
+        named += [(drive, measure) for drive in names for measure in names]
+    seen: set[int] = set()
+    for drive, measure in named:
+        try:
+            made = pattern(n, drive, measure)
+        except ProtocolError:  # no row is left
+            continue
+        if made.n_rows == n_rows and made.hash not in seen:
+            seen.add(made.hash)
+            yield made
 
 
 def pattern_name(protocol: Protocol) -> str:

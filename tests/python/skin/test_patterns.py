@@ -12,6 +12,7 @@ from eitskin.skin.protocol import (
     pattern,
     pattern_name,
     pattern_names,
+    patterns_of_length,
     protocol_from_table,
     require_independent,
     skip,
@@ -41,6 +42,17 @@ def test_each_pair_of_patterns_keeps_its_name(n):
             usual = "adjacent" if drive == "opposite" else drive
             assert pattern_name(made) == (drive if measure == usual else f"{drive}/{measure}")
             made.reciprocal_pairs()  # at most two rows hold one voltage
+
+
+def test_the_patterns_of_a_length_are_each_made_once():
+    made = list(patterns_of_length(16, 208))
+    names = [pattern_name(one) for one in made]
+    assert names == ["adjacent", "skip-1", "skip-2", "skip-3", "skip-4", "skip-5", "skip-6"]
+    both = pattern(16, "opposite", "opposite")  # of one length with no other pattern
+    assert [one.hash for one in patterns_of_length(16, both.n_rows)] == [both.hash]
+    assert "skip-1/adjacent" in map(pattern_name, patterns_of_length(16, 192))
+    assert len(list(patterns_of_length(64, adjacent(64).n_rows))) == 31  # no mixed ones
+    assert not list(patterns_of_length(5, 3))
 
 
 def test_what_is_no_pattern_is_named_a_table():

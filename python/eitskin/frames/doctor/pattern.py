@@ -10,15 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from eitskin.errors import EitskinError
 from eitskin.frames.doctor.case import Case
 from eitskin.frames.doctor.numbering import best_likeness
 from eitskin.frames.doctor.order import LIKELY, OrderChoice
 from eitskin.frames.doctor.report import FAULT, CheckOutcome, Finding
 from eitskin.frames.orders import source_table
-from eitskin.skin.protocol import Protocol, pattern, pattern_name, pattern_names
+from eitskin.skin.protocol import Protocol, pattern_name, patterns_of_length
 
-MIXED_ELECTRODES = 32  # up to this number, different drive and measuring patterns are also tried
 SHOWN = 3
 CLOSER = 4.0
 NEAR_ENOUGH = 0.99  # above this correlation no other pattern is tried
@@ -57,20 +55,9 @@ def check_pattern(case: Case, chosen: OrderChoice) -> CheckOutcome:
 
 def _candidates(own: Protocol) -> Iterator[tuple[Protocol, str]]:
     """Yield the patterns with as many rows as ``own``, without itself, each in both orders."""
-    n = own.n_electrodes
-    names = pattern_names(n)
-    named: list[tuple[str, str | None]] = [(name, None) for name in names]
-    if n <= MIXED_ELECTRODES:
-        named += [(drive, measure) for drive in names for measure in names if drive != measure]
-    tried = {own.hash}
-    for drive, measure in named:
-        try:
-            made = pattern(n, drive, measure)
-        except EitskinError:
+    for made in patterns_of_length(own.n_electrodes, own.n_rows):
+        if made.hash == own.hash:
             continue
-        if made.n_rows != own.n_rows or made.hash in tried:
-            continue
-        tried.add(made.hash)
         yield made, "fixed"
         if not np.array_equal(source_table("rotating", made), made.drive_measure):
             yield made, "rotating"
