@@ -17,6 +17,7 @@ from eitskin.session.sample import SIZE, Sample
 from eitskin.session.session import Session
 from eitskin.session.settings import SessionSettings
 from eitskin.session.summary import Summary
+from eitskin.truth import observe_scene
 from small_models import session as small_session
 
 VALID = jsonschema.Draft202012Validator(schema())
@@ -133,6 +134,30 @@ def test_a_recording_goes_on_where_it_is_asked_to(tmp_path):
                     session.pacer.pause()
                 session.ask(lambda device, at=time_s: session.seek(at))
     assert numbers == [0, 1, 12, 13, 4, 5, 19]
+
+
+@pytest.mark.parametrize("loop", ["", "?loop=1"])
+def test_the_truth_of_a_recording_is_that_of_its_time(tmp_path, loop):
+    """Wherever it begins to be shown, and if its time goes back after a round of the scene."""
+    path = tmp_path / "run.eits"
+    settings = SessionSettings(mode=Stream.TOUCHES, record=path, frames=50)
+    true = []
+    with Session(f"sim:swipe{loop}", settings, observe=observe_scene) as session:
+        true = [one.true for one in session.messages() if isinstance(one, Frame)]
+    assert len({touch.x_mm for touches in true for touch in touches or ()}) > 10
+    last_s = 0.05 * (len(true) - 1)
+    numbers: list[int] = []
+    with Session(f"file:{path}", observe=observe_scene) as session:
+        session.ask(lambda device: session.seek(0.6))
+        for message in session.messages():
+            assert isinstance(message, Frame)
+            if not numbers and message.time_s < 0.5:
+                continue  # read before the wish was
+            numbers.append(round(20 * message.time_s))
+            assert message.true == true[numbers[-1]], numbers
+            if (time_s := {2: last_s, 3: 0.3, 5: last_s}.get(len(numbers))) is not None:
+                session.ask(lambda device, at=time_s: session.seek(at))
+    assert numbers == [12, 13, len(true) - 1, 6, 7, len(true) - 1]
 
 
 def test_only_a_recording_goes_on_elsewhere():
