@@ -171,8 +171,9 @@ def _best(
         limit, product = limits[noise], medians[noise]
         first, ours = min(limit, key=limit.__getitem__), min(product, key=product.__getitem__)
         said.append(
-            f"- {noise}: the least bound has {first}, {number_text(limit[first])} mm (adjacent"
-            f" {number_text(limit['adjacent'])}); the product is best with {ours},"
-            f" {number_text(product[ours])} mm (adjacent {number_text(product['adjacent'])})"
+            f"- {noise}: the bound is smallest with {first}, {number_text(limit[first])} mm"
+            f" (adjacent: {number_text(limit['adjacent'])}); the product's error is smallest with"
+            f" {ours}, {number_text(product[ours])} mm (adjacent:"
+            f" {number_text(product['adjacent'])})"
         )
     return "\n".join(said)
