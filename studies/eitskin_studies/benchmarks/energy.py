@@ -203,11 +203,11 @@ def summary(result: EnergyResult) -> str:
     one = result.cheapest
     analog = sum(part.mw() for part in ALWAYS if part.bipolar)
     return (
-        f"By `eitskin bench energy` from the points of [the trade-off](tradeoff.md). All but the"
-        f" processor take {measuring_mw():.0f} mW, {100 * analog / measuring_mw():.0f} % of it from"
-        f" ±15 V. The cheapest point with an image MIoU of .84 is *{one.name}* ({one.scan}):"
-        f" {one.frame_mj:.1f} mJ a frame at {one.rate_hz:.0f} frames a second, of which the"
-        f" processor takes {one.processor_mj:.1f}."
+        f"By `eitskin bench energy` from the points of [the trade-off](tradeoff.md). All parts but"
+        f" the processor take {measuring_mw():.0f} mW, {100 * analog / measuring_mw():.0f} % of it"
+        f" from ±15 V. The cheapest point with an image MIoU of .84 is *{one.name}* ({one.scan}):"
+        f" at {one.rate_hz:.0f} frames per second it takes {one.frame_mj:.1f} mJ per frame, and"
+        f" {one.processor_mj:.1f} mJ of this is the processor's."
     )
 
 

@@ -170,8 +170,8 @@ def for_page(result: TimeRange, command: str) -> Filling:
     text = (
         f"By `{command}`: the greatest of {result.frames} frames of `emu:{result.scene}`, from the"
         f" optimistic to the pessimistic bound. By the pessimistic bound the multiplexers have"
-        f" switched {worst.switch_most_us:.2f} µs after a burst's last sample at the latest, of"
-        f" {worst.switch_allowed_us:.1f} that a slot of 100 µs leaves. This bound {claim} the 88"
-        f" frames a second that instructions alone promise for 104 rows."
+        f" switched at most {worst.switch_most_us:.2f} µs after a burst's last sample; a slot of"
+        f" 100 µs leaves {worst.switch_allowed_us:.1f} µs for it. This bound {claim} the 88 frames"
+        f" per second that the instructions alone suggest for 104 rows."
     )
     return {"time-run": text}, {"time": table(result)}

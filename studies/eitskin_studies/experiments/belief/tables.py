@@ -137,11 +137,12 @@ def summary(sets: Sets) -> str:
     return (
         f"The expected calibration error of `confidence` is {error:.3f}, over {weight} touches. The"
         f" 90 % ellipses cover {_range(own)} of the true places in the simulator's world and"
-        f" {_range(others)} in others, {len(inside)} of {len(covered)} sets within 87 to 93 %."
-        f" Of two fingers 12 to 16 mm apart {_percent(near.right)} are counted, and"
-        f" {_percent(near.honest)} are counted or called crowded; of frames counted right,"
-        f" {_percent(discs.said_right)} of discs and {_percent(fingers.said_right)} of fingers are"
-        " called crowded, too."
+        f" {_range(others)} in other sets; in {len(inside)} of {len(covered)} sets they cover 87 to"
+        " 93 %. If two fingers are 12 to 16 mm apart, the count is right in"
+        f" {_percent(near.right)} of the frames, and right or called crowded in"
+        f" {_percent(near.honest)}. Frames that are counted right are called crowded in"
+        f" {_percent(discs.said_right)} of the scenes with discs, and in"
+        f" {_percent(fingers.said_right)} of those with fingers."
     )
 
 
@@ -150,7 +151,7 @@ def conditions(settings: ExperimentSettings, count: int) -> str:
     return (
         'The prebuilt model, float32, default options; scenes of the family "judging" of the [other'
         f" worlds](other-worlds.md), seed {settings.seed}, {count} a set; constants were chosen on"
-        ' the family "tuning". A touch is true where it is paired with a true one within 10 mm.'
+        ' the family "tuning". A touch is true if it is paired with a true one within 10 mm.'
         " Brackets: Wilson's 95 % intervals."
     )
 

@@ -122,10 +122,10 @@ def _best(bars: Sequence[Bar]) -> str:
             for one in (best, usual)
         )
         said.append(
-            f"{words} the best image of {len(mine)} is that of {best.electrodes} electrodes,"
-            f" {best.pattern}: {ours}, where {usual.electrodes} adjacent ones have {theirs}."
+            f"{words} the best of {len(mine)} images is that of {best.electrodes} electrodes,"
+            f" {best.pattern}: {ours}. {usual.electrodes} adjacent electrodes have {theirs}."
         )
-    return " ".join([*said, "The best of many flatters a little."])
+    return " ".join([*said, "The best of many results is always a little too good."])
 
 
 def _bar(case: PatternCase, result: Any) -> Bar:

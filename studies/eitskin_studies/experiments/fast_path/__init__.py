@@ -123,9 +123,9 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         for number, one in enumerate(workspace.progress(beyond.rows(), "beyond"))
     ]
     words = (
-        f"Seed {settings.seed}; discs of radius 8 mm, contrast 5, 60 dB unless said; frames from"
-        f" {ELEMENTS} elements, contacts spread by 30 %, a tare of 64 frames; 100 us a row, drives"
-        " by 7; the prebuilt model."
+        f"Seed {settings.seed}; discs of radius 8 mm and contrast 5; 60 dB unless a line says"
+        f" otherwise; frames from {ELEMENTS} elements, contacts spread by 30 %, a tare of 64"
+        " frames; 100 us per row; every seventh drive comes next; the prebuilt model."
     )
     tables = (_table("rows", found), _table("beyond", more, 8))
     data = {"rows": found, "beyond": more}
@@ -344,9 +344,9 @@ def _unfounded(found: list[dict[str, Any]]) -> str:
         for noisy in (False, True)
     ]
     return (
-        f"Of all frames of still skins, presses and swipes {shares[0]} have a diagnostic at 60 dB"
-        f" and {shares[1]} at 40 dB. Of {drives:,} drives of scenes with a fault {false} have a"
-        " false touch."
+        "Untouched skins, presses and swipes have no fault; at 60 dB a diagnostic is reported in"
+        f" {shares[0]} of their frames, at 40 dB in {shares[1]}. In the scenes with a fault,"
+        f" {false} of {drives:,} drives have a false touch."
     )
 
 

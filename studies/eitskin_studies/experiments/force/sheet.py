@@ -163,6 +163,6 @@ def pressures() -> str:
 
     return (
         f"From {WEIGHTS_G[0]:g} to {WEIGHTS_G[-1]:g} g the sheet of {SHEET.sheet_mm:g} mm radius"
-        f" presses with {of(SHEET)}, the round tip with {of(NOMINAL)}; the paper's gel stands"
+        f" presses with {of(SHEET)}, the round tip with {of(NOMINAL)}; the paper's gel bears"
         f" {GEL_LIMIT_KPA:g} kPa."
     )

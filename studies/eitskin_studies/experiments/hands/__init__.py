@@ -72,8 +72,9 @@ def run(workspace: Workspace) -> ExperimentOutcome:
     named = _library(workspace, blob)
     words = (
         f"Seed {settings.seed}; fingers of radius 6.5 to 9.5 mm and contrast 3 to 8, a palm of 22"
-        f" mm and contrast 2; frames from {ELEMENTS} elements; 60 dB unless said, a tare of"
-        f" {scenes.UNTOUCHED} frames; 48 frames a second, 100 us a row; the prebuilt model."
+        f" mm and contrast 2; frames from {ELEMENTS} elements; 60 dB unless a line says"
+        f" otherwise; a tare of {scenes.UNTOUCHED} frames; 48 frames per second, 100 us per row;"
+        " the prebuilt model."
     )
     tables = (_false_table(found), _time_table(found), named)
     return ExperimentOutcome(tables, {"kinds": found}, {}, {"sets": words})

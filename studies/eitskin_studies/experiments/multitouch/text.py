@@ -45,11 +45,11 @@ def closing(counted: CountedScenes, limited: Sequence[Limit]) -> str:
     default = NAMES[0]
     far = ", ".join(f"{where} {_far(counted, where, default)}" for where in GEOMETRIES)
     return (
-        f"- Most touches up to which at least {100 * GOOD:.0f} % of the scenes are exact at"
+        f"- Up to this number of touches, at least {100 * GOOD:.0f} % of the scenes are exact at"
         f" {HEADLINE_DB:g} dB: {far}.\n"
-        f"- Of {sum(one.scenes for one in limited)} frames with many touches"
-        f" {sum(one.core[default] for one in limited)} are exact;"
-        f" {sum(one.told[default] for one in limited)} are if the fit starts from the true places."
+        f"- {sum(one.core[default] for one in limited)} of"
+        f" {sum(one.scenes for one in limited)} frames with many touches are exact. If the fit"
+        f" starts from the true places, {sum(one.told[default] for one in limited)} are."
     )
 
 
@@ -60,8 +60,9 @@ def doubtful(ambiguous: Ambiguities) -> str:
         one = calibration([f for f in ambiguous.mixed[NAMES[0]] if f.snr_db == snr_db])
         told.append(
             f"At {snr_db:g} dB {_pc(one.not_said)} of the mixed scenes are not reported as"
-            f" `crowded`, and {_pc(one.right_not_said)} of these are counted right, of the reported"
-            f" ones {_pc(one.right_said)}; {_pc(one.wrong_said)} of the wrong counts are reported."
+            f" `crowded`. {_pc(one.right_not_said)} of these are counted right, and"
+            f" {_pc(one.right_said)} of the reported ones. {_pc(one.wrong_said)} of the wrong"
+            " counts are reported."
         )
     return " ".join(told)
 

@@ -119,13 +119,13 @@ def summary(scores: Scores) -> str:
     half = [one for one in failing if _exact(one) < 0.5]
     warned = [one["warned"] for one in failing if one["warned"] is not None]
     text = (
-        f"In {len(failing)} of {len(scores)} sets fewer than 90 % of the scenes are exact, in"
-        f" {len(half)} fewer than half."
+        f"In {len(failing)} of {len(scores)} sets fewer than 90 % of the scenes are counted"
+        f" exactly, and in {len(half)} of them fewer than half."
     )
     if warned:
         text += (
-            f" A diagnostic says so in {100 * min(warned):.0f} to {100 * max(warned):.0f} % of"
-            " their wrong scenes, depending on the set."
+            f" In these sets a diagnostic is reported for {100 * min(warned):.0f} to"
+            f" {100 * max(warned):.0f} % of the wrong scenes, depending on the set."
         )
     return text
 

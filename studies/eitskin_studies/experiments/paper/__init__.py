@@ -188,9 +188,9 @@ def _table(exact: dict[tuple[str, str], list[list[bool]]]) -> Table:
 
 def _words(contacts: int, seed: int) -> str:
     return (
-        f"Seed {seed}; discs of radius {RADIUS_MM:g} mm and contrast {CONTRAST:g}, each next one"
-        f" where it changes the frame most, at least {APART_MM:g} mm from those before;"
-        f" {contacts * NOISES} frames a number, from {contacts} draws of contacts with {NOISES} of"
-        f" noise, {AS_EVERYWHERE}; the prebuilt model with its defaults. In %, scenes counted"
-        " exactly."
+        f"Seed {seed}; discs of radius {RADIUS_MM:g} mm and contrast {CONTRAST:g}. Each one is"
+        f" placed where it changes the frame most, at least {APART_MM:g} mm from those before. Each"
+        f" number is from {contacts * NOISES} frames: {contacts} draws of contacts with {NOISES} of"
+        f" noise each, {AS_EVERYWHERE}; the prebuilt model with its defaults. Numbers are the"
+        " scenes that are counted exactly, in %."
     )

@@ -252,11 +252,11 @@ def conditions(evaluation_sets: EvaluationSets, settings: ExperimentSettings) ->
     """Sets, seeds, noise, thresholds."""
     tuned, tested = len(evaluation_sets.metal.frames_v), len(evaluation_sets.test.frames_v)
     return (
-        f"Parameters and t: {tuned} simulated scenes of metal, for both signs as many of metal and"
-        f' plastic, seed {settings.tuning_seed}; columns "simulated": {tested} scenes of metal,'
-        f" seed {settings.seed}. Noise: {100 * evaluation_sets.noise_share:.1f} % of the rms of"
-        " each frame's change, as the measured frames' reciprocal readings show (median). MIoU"
-        " bilinear."
+        f"Parameters and t are chosen on {tuned} simulated scenes with metal, and for both signs on"
+        f' as many with metal and plastic, seed {settings.tuning_seed}. The columns "simulated"'
+        f" are of {tested} other scenes with metal, seed {settings.seed}. The simulated noise is"
+        f" {100 * evaluation_sets.noise_share:.1f} % of the rms of each frame's change, the median"
+        " that the reciprocal readings of the measured frames show. The MIoU is bilinear."
     )
 
 

@@ -114,11 +114,12 @@ def run(workspace: Workspace) -> ExperimentOutcome:
 
 def _conditions(splits: int) -> str:
     return (
-        f"{splits} random splits of 500 presses (seeds 0 to {splits - 1}); the last {JUDGED} of"
-        " each are scored, each against the untouched frame just before it; medians over splits."
-        " No number of a method was chosen on scored presses, but the method as a whole was"
-        " developed on this set. Two presses are sums of two real ones; exact: two touches, each"
-        f" within {PAIR_MM:g} mm of its own."
+        f"The 500 presses are split at random {splits} times (seeds 0 to {splits - 1}). The last"
+        f" {JUDGED} of each split are scored, each against the untouched frame just before it;"
+        " numbers are medians over the splits. No number of a method was chosen on scored presses,"
+        " but the method as a whole was developed on this set. Two presses at once are sums of two"
+        " real ones; their count is exact if two touches are found, each within"
+        f" {PAIR_MM:g} mm of its own press."
     )
 
 
