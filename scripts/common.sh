@@ -101,7 +101,7 @@ install_package() {
     if changed_since "$stamp" "$root/python" "$root/firmware" "$root/csrc" "$root/cmake" "$root/CMakeLists.txt" "$root/pyproject.toml" \
         "$root/hardware/eitskin_hardware" "$root/hardware/pyproject.toml"; then
         find_python
-        say "installing eitskin[$1]: packages, and compiling the C core; about half a minute"
+        say "installing eitskin[$1]: packages, and compiling the C core; half a minute on an idle computer, some minutes on a busy one"
         touch "$stamp.next"
         again="eitskin eitskin-emulator"
         case $1 in

@@ -5,9 +5,14 @@ An error's text is one line that says what was wrong, where, and what to do abou
 docs/reference/error-codes.md lists the codes.
 """
 
+import json
+import shlex
 from collections.abc import Iterable
-from importlib.metadata import PackageNotFoundError, metadata
+from importlib.metadata import PackageNotFoundError, distribution, metadata
 from importlib.util import find_spec
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 LONGEST, ENDING = 3000, 1000  # characters of a line, and of the end that is kept of longer ones
 
@@ -130,11 +135,27 @@ EXTRAS = {  # the packages of each extra, and the module by which each is found
 
 def missing_checkout(what: str, *folders: str) -> MissingExtraError:
     """Return the error for ``what``, which is in ``folders`` of a checkout and not in the wheel."""
+    here = checkout()
+    if here is not None:
+        names = " ".join(shlex.quote(str(here / folder)) for folder in folders)
+        return MissingExtraError(f"{what} is not installed yet: run  pip install {names}")
     names = " ".join(f"./{folder}" for folder in folders)
     return MissingExtraError(
         f"{what} comes with eitskin's sources, not with the wheel: run  git clone {sources_url()} "
         f" and in its folder  pip install {names}"
     )
+
+
+def checkout() -> Path | None:
+    """Return the folder of the sources from which this package was installed; None: it came as a
+    wheel, or the folder is gone."""
+    try:
+        noted = distribution("eitskin").read_text("direct_url.json")
+    except PackageNotFoundError:  # run from the sources themselves
+        noted = None
+    url = urlsplit(json.loads(noted).get("url", "") if noted else "")
+    path = Path(url2pathname(url.path))
+    return path if url.scheme == "file" and (path / "firmware" / "emulator").is_dir() else None
 
 
 def sources_url() -> str:

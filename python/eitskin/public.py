@@ -1,10 +1,12 @@
 """The functions that ``import eitskin`` gives: they stream a skin's frames and load models."""
 
+import inspect
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from eitskin.config import nearest
 from eitskin.device.settings import SolverSettings
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
@@ -160,5 +162,9 @@ def _solver(named: dict[str, Any]) -> SolverSettings:
     try:
         return SolverSettings(**named)
     except TypeError:
-        known = ", ".join(SolverSettings.__dataclass_fields__)
-        raise UsageError(f"stream({', '.join(named)}): the solver has {known}") from None
+        solver = SolverSettings.__dataclass_fields__
+        unknown = next(name for name in named if name not in solver)
+        own = (name for name in inspect.signature(stream).parameters if name != "solver")
+        raise UsageError(
+            f"stream({unknown}=...): there is no such argument; {nearest(unknown, (*own, *solver))}"
+        ) from None

@@ -101,7 +101,8 @@ def _check(options: argparse.Namespace) -> None:
     if not check.compared:
         raise FrameError(
             f"{options.recording}: nothing to compare: the recording must hold raw frames, and"
-            " images or touches, from the tare on, as  eitskin record  makes it by default"
+            " images or touches, from the tare on; make it with  eitskin record , or in Python with"
+            '  stream(..., mode="raw,touches", record=...)'
         )
     facts = {"recording": str(options.recording), "solver_noted": noted}
     answer(options, facts | check.as_dict(), check.text())

@@ -48,13 +48,17 @@ INVALID_CHOICE = re.compile(  # argparse's text, with quotes before Python 3.12
     r"argument (?P<what>.*?): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)"
 )
 UNKNOWN = re.compile(r"unrecognized arguments: (?:.* )?(?P<option>--[\w-]+)")
+SUPERFLUOUS = re.compile(r"unrecognized arguments: (?P<word>[^-]\S*).*", re.DOTALL)
 REPLACED = re.compile(r"unrecognized arguments: .*--(budget|accuracy)\b")
 ENTRY_POINT_GROUP = "eitskin.commands"  # commands of other packages
 STUDIES = ("bench", "compare", "dataset", "draw", "study", "tradeoff")  # in eitskin-studies
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that reports errors in one line, like all other errors."""
+    """A parser that reports errors in one line, like all other errors. ``of_command`` is the
+    command whose help they name; None: the parser's own."""
+
+    of_command: str | None = None
 
     def error(self, message: str) -> NoReturn:
         """Raise a UsageError instead of printing the usage and exiting. For an invalid choice,
@@ -72,8 +76,18 @@ class Parser(argparse.ArgumentParser):
             message += f"; {close}" if close.startswith("did you mean") else ""
         if REPLACED.match(message):
             message += "; use --preset, or a model of  eitskin recommend -o MODEL.eitm"
+        superfluous = SUPERFLUOUS.fullmatch(message)
+        if superfluous:
+            message += _remedy_for(superfluous["word"], _options_of(self))
         see = " See" if message.endswith("?") else "; see"
-        raise UsageError(f"{message}{see}  {self.prog} --help")
+        raise UsageError(f"{message}{see}  {self.of_command or self.prog} --help")
+
+
+def _remedy_for(word: str, options: Sequence[str]) -> str:
+    """Return what may be meant by a ``word`` too many, which is no option."""
+    if "--device" in options and (word == "auto" or ":" in word):
+        return f"; did you mean '--device {word}'?"
+    return "; a name with spaces needs quotes"
 
 
 def _options_of(parser: argparse.ArgumentParser) -> list[str]:
@@ -95,6 +109,8 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"eitskin {__version__}")
     option(parser, "--traceback", "on an error, show where in the code it arose")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND")
+    if only in COMMANDS:
+        parser.of_command = f"eitskin {only}"
     for name, text in COMMANDS.items():
         command = subparsers.add_parser(name, help=text)
         if only in (None, name):

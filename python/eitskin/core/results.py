@@ -76,9 +76,14 @@ def check_shape(frames: AnyArray, n_rows: int, what: str, least: int = 0) -> Non
         )
 
 
-def frame_numbers(values: npt.ArrayLike, what: str) -> FloatArray:
+def frame_numbers(values: npt.ArrayLike | None, what: str) -> FloatArray:
     """Return ``values`` as an array; values hidden by a numpy mask become NaN, and their rows are
     not used."""
+    if values is None:
+        raise FrameError(
+            f"{what}: is None, not an array of voltages; a stream has them only if its mode asks"
+            ' for them: mode="raw,touches"'
+        )
     try:
         if isinstance(values, np.ma.MaskedArray):
             return np.where(np.ma.getmaskarray(values), np.nan, np.asarray(values, np.float64))

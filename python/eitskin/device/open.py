@@ -136,8 +136,12 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
                 f"device {url!r}: "
                 + ("nothing follows  auto" if colon else f"write  {AS_IN[scheme]}")
             )
+        meant = None if colon else _meant(bare)
+        if meant is not None:
+            raise UsageError(f"device {url!r}: write  {meant}")
+        remedy = nearest(scheme, (*SCHEMES, *source_schemes()))
         raise UsageError(
-            f"device {url!r}: {nearest(scheme, (*SCHEMES, *source_schemes()))}, as in auto,"
+            f"device {url!r}: {remedy}{' As' if remedy.endswith('?') else ', as'} in auto,"
             f" {', '.join(AS_IN.values())}"
         )
     if image is not None and scheme != "emu":
@@ -169,6 +173,16 @@ def open_transport(url: str, *, model: bytes | None = None, image: Path | None =
     from eitskin.device.recordings.recording import FileTransport
 
     return FileTransport(rest)
+
+
+def _meant(name: str) -> str | None:
+    """Return what to write for a device that is named without a scheme: a recording or a scene of
+    the library."""
+    from eitskin.scene.library_scenes import library
+
+    if Path(name).suffix == ".eits":
+        return f"file:{name}"
+    return f"sim:{name}" if name in library() else None
 
 
 def _emulated(scene: str, model: bytes | None, image: Path | None, loop: bool) -> Transport:

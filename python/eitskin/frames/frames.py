@@ -6,6 +6,7 @@ checked completely.
 """
 
 import json
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -252,6 +253,16 @@ def save_frames(path: str | Path, frames: Frames) -> None:
         np.savez_compressed(stream, **fields)
 
 
+def refuse_recording(path: str | Path) -> None:
+    """Raise a FrameError if ``path`` names a recording of a board, in place of a file of frames."""
+    if Path(path).suffix.lower() == ".eits" and Path(path).exists():
+        frames = shlex.quote(str(Path(path).with_suffix(".npz")))
+        raise FrameError(
+            f"{path}: a recording of a board, not a file of frames; export its raw frames:  eitskin"
+            f" replay {shlex.quote(str(path))} --frames {frames}"
+        )
+
+
 def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
     """Read a frames file. ``allow_nonfinite`` accepts NaN and Inf voltages, for ``eitskin doctor``.
 
@@ -261,6 +272,7 @@ def load_frames(path: str | Path, *, allow_nonfinite: bool = False) -> Frames:
             wrong.
     """
     where = str(path)
+    refuse_recording(path)
     if Path(path).suffix.lower() in FOREIGN and Path(path).exists():
         raise FrameError(
             f"{where}: not a frames file; convert it:  eitskin import {where} -o"

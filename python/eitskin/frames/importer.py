@@ -17,7 +17,7 @@ from eitskin import __version__
 from eitskin.arrays import FloatArray, IntArray
 from eitskin.errors import FrameError, ProtocolError, UsageError
 from eitskin.frames.eidors import with_eidors_defaults
-from eitskin.frames.frames import Frames, load_frames
+from eitskin.frames.frames import Frames, load_frames, refuse_recording
 from eitskin.frames.homogeneous import homogeneous
 from eitskin.frames.import_options import ImportOptions
 from eitskin.frames.orders import (
@@ -104,6 +104,7 @@ def imported(
     if not files:
         raise UsageError("name a file to import")
     first, where = files[0], str(files[0])
+    refuse_recording(first)
     refuse_contradictions(options, where)
     if Path(first).suffix.lower() == ".mat":
         options, n_electrodes = with_eidors_defaults(first, options, protocol, n_electrodes)

@@ -4,6 +4,7 @@ a page, and nothing of the board waits for it."""
 from __future__ import annotations
 
 import asyncio
+import errno
 import hmac
 import ipaddress
 import json
@@ -68,9 +69,11 @@ def listen(host: str, port: int) -> socket.socket:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         return socket.create_server((host, port), family=family)
     except OSError as error:
+        taken = error.errno == errno.EADDRINUSE
+        why = "another program has it, perhaps a second view" if taken else error.strerror
         raise UsageError(
-            f"cannot listen on {host} port {port} ({error.strerror}); name another with  --port,"
-            " --port 0  for any that is free"
+            f"cannot listen on {host} port {port} ({why}); name another with  --port, --port 0  for"
+            " any that is free"
         ) from None
 
 

@@ -100,6 +100,8 @@ def load_robot(path: str | Path) -> Robot:
             )
         return Robot(urdf.name, _skins(list(urdf.skins), urdf, path, "<eitskin>"), path)
     table = load_toml(path, "robot file")
+    if "scene" in table:
+        raise ConfigError(f"{path}: a scene, not a robot file; as a device it is  sim:{path}")
     check_keys(table, ("robot", "skin"), str(path))
     head = subtable(table, "robot", str(path))
     check_keys(head, ("name", "urdf"), f"{path} [robot]")

@@ -85,9 +85,10 @@ class _SkinTopics:
             yield self._prefix + name, kind, table
 
     def _plain(self, outgoing: OutgoingMessage) -> Iterator[Topic]:
-        message, now, at, link = outgoing.message, outgoing.time_ns, self._frame_id, self._link
-        if message["type"] == "summary":
+        message = outgoing.message
+        if message["type"] == "summary":  # it has no time
             return
+        now, at, link = outgoing.time_ns, self._frame_id, self._link
         if outgoing.report is not None:
             yield "/reports", "eitskin_msgs/msg/Report", ros2.report(message, now, at)
             yield "/contacts", CONTACTS, contacts(message, now, link)

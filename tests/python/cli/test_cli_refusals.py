@@ -54,6 +54,12 @@ def test_every_command_has_help(command, capsys):
 @pytest.mark.parametrize("command", STUDIES)
 def test_a_command_of_the_studies_says_where_they_are(command, refused, monkeypatch):
     monkeypatch.setattr("eitskin.cli.main.entry_points", lambda group: [])
+    monkeypatch.setattr("eitskin.errors.checkout", lambda: Path("/my sources"))
+    assert refused(EXTRA, f"{command} --help") == (
+        f"eitskin {command} is not installed yet: run  pip install '/my sources/firmware/emulator'"
+        " '/my sources/studies'"
+    )
+    monkeypatch.setattr("eitskin.errors.checkout", lambda: None)
     assert refused(EXTRA, f"{command} --help") == (
         f"eitskin {command} comes with eitskin's sources, not with the wheel: run  git clone"
         f" {sources_url()}  and in its folder  pip install ./firmware/emulator ./studies"

@@ -14,6 +14,8 @@ from eitskin.device.open import open_device
 from eitskin.errors import EitskinError, FrameError, UsageError
 from eitskin.frames.arrays import pick, read_arrays
 from eitskin.frames.frames import Frames, save_frames
+from eitskin.page.server import listen
+from eitskin.session.checks.raw_frames import frames_of as raw_frames
 from eitskin.skin.drawing import read_drawing
 from eitskin.skin.drawing_shapes import DrawingReading
 from small_models import session
@@ -212,3 +214,34 @@ def test_presses_that_are_continued_are_named_with_their_option(tmp_path, capsys
     assert said.endswith("; the presses go there unless you say  --presses FILE\n")
     assert main([*view, "--presses", str(presses)]) != 0
     assert "--presses FILE" not in capsys.readouterr().err
+
+
+def test_an_unknown_argument_of_stream_gets_the_nearest_of_all():
+    with pytest.raises(UsageError, match=r"stream\(frame=...\).*did you mean 'frames'"):
+        next(eitskin.stream("sim:two_touch", sign="both", frame=3))
+    with pytest.raises(UsageError, match="did you mean 'iterations'"):
+        next(eitskin.stream("sim:two_touch", iteration=3))
+
+
+def test_a_frame_without_voltages_names_the_mode_that_brings_them():
+    with pytest.raises(FrameError, match=r'is None.*mode="raw,touches"'):
+        eitskin.Reconstructor(eitskin.load_model()).reconstruct(None)
+
+
+def test_a_recording_without_raw_frames_says_how_python_records_them(tmp_path):
+    path = tmp_path / "run.eits"
+    for _ in eitskin.stream("sim:two_touch", frames=1, record=path):
+        pass
+    with pytest.raises(FrameError, match=r'in Python .*mode="raw,touches"'):
+        raw_frames(path)
+
+
+def test_a_port_in_use_is_told_in_words():
+    with listen("127.0.0.1", 0) as first:
+        port = first.getsockname()[1]
+        with pytest.raises(UsageError) as end:
+            listen("127.0.0.1", port)
+    assert str(end.value) == (
+        f"cannot listen on 127.0.0.1 port {port} (another program has it, perhaps a second view);"
+        " name another with  --port, --port 0  for any that is free"
+    )

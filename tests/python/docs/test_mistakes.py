@@ -51,6 +51,7 @@ FILES = {
     "[electrodes]\ncount = 16\nwidth_mm = 0.3\n",
     "hidden.toml": '[skin]\noutline = "hidden.svg"\nthickness_mm = 5.0\n'
     "[electrodes]\ncount = 16\nwidth_mm = 0.3\n",
+    "old.eits": "",
     "fast.toml": "[scene]\nframes = 4\nquiet_frames = 8\nelements = 1500\nrate_hz = 60\n",
 }
 

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from eitskin.errors import UsageError
+from eitskin.session.message import summary_message
 from eitskin.sinks.ros2_dds import dds_name, dds_type, filled, open_sink
 from eitskin.sinks.ros2_topics import CONTACTS, MARKERS, POSES, RosTopics, definitions
 from eitskin.sinks.sink import OutgoingMessage
@@ -58,6 +59,11 @@ def test_each_message_is_read_by_other_definitions(store, swipe, drives):
             assert header.frame_id == "skin"
             seen.add(kind)
     assert seen == set(definitions())
+
+
+def test_the_summary_at_the_end_has_no_topic(swipe):
+    last = OutgoingMessage(summary_message({"frames": 3}, swipe.source.name))
+    assert list(RosTopics(swipe.source).of(last)) == []
 
 
 def test_places_are_metres_in_the_skins_frame(store, swipe):

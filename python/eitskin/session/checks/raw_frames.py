@@ -142,8 +142,8 @@ def frames_of(path: str | Path, model: Path | None = None) -> Frames:
         run = gather(read_frames(device, Stream.RAW))
         if not run.frames:
             raise FrameError(
-                f"{name}: holds no raw frames; record with raw streaming (eitskin record does by"
-                " default)"
+                f"{name}: holds no raw frames; record them, as  eitskin record  does by default; in"
+                ' Python  stream(..., mode="raw,touches", record=...)'
             )
         return as_frames(
             run.untouched, run.frames, protocol, device.board, known, allow_nonfinite=True
