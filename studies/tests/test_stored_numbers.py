@@ -105,3 +105,34 @@ def test_every_study_has_a_command_that_exists(monkeypatch, capsys):
     for wrong in ([], ["other-world"]):
         with pytest.raises(UsageError, match="studies/run"):
             make_results.main(wrong)
+    for names in (make_results.ALONE, make_results.AFTER, make_results.AFTER.values()):
+        assert set(names) <= known.keys()
+    # the commands that fill one page never run at the same time
+    for page in {word for words in known.values() for word in words if word.endswith(".md")}:
+        fill = {name for name, words in known.items() if page in words} - {*make_results.ALONE}
+        assert sum(make_results.AFTER.get(name) not in fill for name in fill) <= 1, page
+
+
+def test_a_command_that_fails_does_not_stop_the_others(tmp_path, monkeypatch, capsys):
+    results = tmp_path / make_results.RESULTS
+    results.mkdir(parents=True)
+    mark = make_results.TIMES
+    table = "| command | processor time, min |\n|---|---|\n| other | 7.0 |\n| last | 1.0 |"
+    page = results / "README.md"
+    page.write_text(f"<!-- {mark} -->\n{table}\n<!-- end {mark} -->\n")
+    (tmp_path / "README.md").write_text("<!-- numbers -->\n<!-- end numbers -->\n")
+    log = tmp_path / "order"
+    shell = {name: ["sh", "-c", f"echo {name} >> {log}; exit {name == 'bad':d}"]
+             for name in ("next", "bad", "last", "slow", "alone")}  # fmt: skip
+    monkeypatch.setattr(make_results, "checkout_root", lambda: tmp_path)
+    monkeypatch.setattr(make_results, "commands", lambda: shell)
+    monkeypatch.setattr(make_results, "fill_readme", lambda *_: None)
+    monkeypatch.setattr(make_results, "DATA", {})
+    monkeypatch.setattr(make_results, "ALONE", ("alone",))
+    monkeypatch.setattr(make_results, "AFTER", {"next": "slow"})
+    assert make_results.main(["--all"]) == 1
+    assert "failed: bad" in capsys.readouterr().out
+    ran = log.read_text().split()
+    assert ran[-2:] == ["last", "alone"] and ran.index("next") == ran.index("slow") + 1
+    times = make_results._known_times(page)
+    assert times["other"] == "7.0" and times["slow"] == "0.0" and "bad" not in times
