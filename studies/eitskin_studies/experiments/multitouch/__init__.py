@@ -56,10 +56,10 @@ def run(workspace: Workspace) -> ExperimentOutcome:
         made,
         data(counted, limited, ambiguous),
         {
-            "exact.png": lambda path: pictures.draw_counts(path, counted),
+            "exact.svg": pictures.counts_drawing(counted),
             "gallery.png": lambda path: pictures.draw_gallery(path, touch_data.skin, examples),
-            "doubt.png": lambda path: pictures.draw_ambiguity(path, ambiguous),
-            "touch_scores.png": lambda path: pictures.draw_touch_scores(path, ambiguous),
+            "doubt.svg": pictures.doubt_drawing(ambiguous),
+            "touch_scores.svg": pictures.touch_scores_drawing(ambiguous),
         },
         {
             "conditions": conditions(touch_data, workspace),

@@ -212,13 +212,13 @@ def limit_table(limits: Sequence[Limit]) -> Table:
             f"{one.nonlinear}/{one.scenes}", f"{one.worst_mm:.1f}",
             f"{one.deviation_mm:.2f}",
         ))  # fmt: skip
-    told = (text for name in NAMES for text in (f"{name}: as it is", f"{name}: given the places"))
+    told = (text for name in NAMES for text in (name, f"{name}, from the true places"))
     head = (
         "places",
         "touches",
         "SNR, dB",
         *told,
-        "nonlinear, given",
+        "nonlinear, from there",
         "its worst touch, mm",
         "by noise alone, mm",
     )

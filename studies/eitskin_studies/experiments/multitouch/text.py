@@ -44,13 +44,33 @@ def closing(counted: CountedScenes, limited: Sequence[Limit]) -> str:
     """Say how many touches the core counts, and what limits the count."""
     default = NAMES[0]
     far = ", ".join(f"{where} {_far(counted, where, default)}" for where in GEOMETRIES)
+    frames, core, told, nonlinear = (
+        sum(values)
+        for values in zip(
+            *((one.scenes, one.core[default], one.told[default], one.nonlinear) for one in limited),
+            strict=True,
+        )
+    )
     return (
         f"- Up to this number of touches, at least {100 * GOOD:.0f} % of the scenes are exact at"
         f" {HEADLINE_DB:g} dB: {far}.\n"
-        f"- {sum(one.core[default] for one in limited)} of"
-        f" {sum(one.scenes for one in limited)} frames with many touches are exact. If the fit"
-        f" starts from the true places, {sum(one.told[default] for one in limited)} are."
+        f"- {core} of {frames} frames with many touches are exact. If the same fit starts from the"
+        f" true places, {told} are. By a nonlinear fit that starts there, {nonlinear} are."
+        f"{_cause(frames, core, told, nonlinear)}"
     )
+
+
+def _cause(frames: int, core: int, told: int, nonlinear: int) -> str:
+    """Return what loses most of the frames that the core does not count exactly."""
+    lost = {
+        "the core's search, which misses the true places": told - core,
+        "the approximations of the fit, which has no joint fit after it": (
+            nonlinear - max(core, told)
+        ),
+        "the data, which do not hold enough": frames - max(core, told, nonlinear),
+    }
+    cause = max(lost, key=lambda name: lost[name])
+    return f" Most of the others are lost to {cause}." if lost[cause] > 0 else ""
 
 
 def doubtful(ambiguous: Ambiguities) -> str:
