@@ -6,7 +6,14 @@ from typing import Any
 
 from eitskin_studies.benchmarks.limit import LimitResult
 from eitskin_studies.harness.drawings import Drawing
-from eitskin_studies.pictures.style import BLUE, VERMILION, drawing, legend_below, plain_axes
+from eitskin_studies.pictures.style import (
+    BLUE,
+    VERMILION,
+    drawing,
+    legend_below,
+    plain_axes,
+    plain_ticks,
+)
 
 TITLES = {
     "place": "distance from the rim",
@@ -15,6 +22,7 @@ TITLES = {
     "touches": "touches",
     "pattern": "drive pattern, noise",
 }
+TICKS_MM = (0.01, 0.03, 0.1, 0.3, 1, 3)
 
 
 def limit_drawing(result: LimitResult) -> Drawing:
@@ -62,5 +70,6 @@ def draw_limit(path: Path, tables: Mapping[str, Sequence[Mapping[str, Any]]]) ->
             axes.set_title(TITLES[name])
             axes.set_xlim(-0.7, len(rows) - 0.3)
             plain_axes(axes, "y")
+        plain_ticks(panels[0].yaxis, TICKS_MM)
         panels[0].set_ylabel("place, median (mm)")
         legend_below(figure, panels[0], 2)
