@@ -7,6 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from eitskin.errors import UsageError
+from eitskin_studies.experiments import constants
+from eitskin_studies.experiments.constants import protected
 from eitskin_studies.experiments.constants.judged import FrameScene, Score
 from eitskin_studies.experiments.constants.models import of_other_models
 from eitskin_studies.experiments.constants.scenes import SceneMaker
@@ -105,3 +108,10 @@ def test_scores_add_up():
     one = Score(frames=1, exact=1, errors_mm=[0.5], macs=10)
     one.add(Score(frames=1, errors_mm=[1.5], macs=5))
     assert one == Score(frames=2, exact=1, errors_mm=[0.5, 1.5], macs=15)
+
+
+def test_a_run_without_the_c_tests_is_refused_before_anything_is_made(tmp_path, monkeypatch):
+    monkeypatch.setattr(protected, "checkout_root", lambda: tmp_path)
+    with pytest.raises(UsageError, match="cmake --preset host"):
+        constants.run(workspace(tmp_path / "out"))
+    assert not (tmp_path / "out" / "variant").exists()

@@ -52,10 +52,30 @@ def test_the_readmes_numbers_are_those_of_the_pages(tmp_path):
         fill_readme(copy, RESULTS)
 
 
-def test_the_sentences_to_doubt_have_the_numbers_of_the_pages_they_link_to():
+def _numbers(text: str) -> set[str]:
+    return {f"{float(one):g}" for one in re.findall(r"(?<![\w.])(?:\d*\.\d+|\d+)(?!\w)", text)}
+
+
+def _rows(title: str) -> list[str]:
     page = (RESULTS / "README.md").read_text(encoding="utf-8")
-    rows = page.split("## Ten sentences to doubt first")[1].split("\n## ")[0].splitlines()
-    rows = [row for row in rows if row.startswith('| "')]
+    lines = page.split(f"## {title}")[1].split("\n## ")[0].splitlines()
+    return [line for line in lines if line.startswith("|")][2:]
+
+
+def test_the_measured_numbers_of_each_aim_are_on_the_pages_that_its_line_links_to():
+    linked: set[str] = set()
+    for row in _rows("Measured against the aims"):
+        # a line without a link goes on with the pages of the line above
+        linked = set(re.findall(r"\]\(([^)#]+\.md)", row)) or linked
+        known = set()
+        for page in (RESULTS / name for name in linked):
+            for path in (page, file_of(page)):  # a page may leave intervals out
+                known |= _numbers(path.read_text(encoding="utf-8")) if path.exists() else set()
+        assert _numbers(row.strip("|").split("|")[-1]) - known == set(), row
+
+
+def test_the_sentences_to_doubt_have_the_numbers_of_the_pages_they_link_to():
+    rows = _rows("Ten sentences to doubt first")
     assert len(rows) == 10
     for row in rows:
         linked = set(re.findall(r"\]\(([^)#]+\.md)", row)) | {"../../README.md"}

@@ -70,13 +70,7 @@ class Tests:
     """
 
     def __init__(self, folder: Path) -> None:
-        root = checkout_root()
-        programs = sorted((root / "build" / "host" / "tests" / "c").glob("test_*_f32"))
-        if not programs:
-            raise UsageError(
-                "constants: the C tests are not built; run  cmake --preset host && cmake --build"
-                " --preset host  in the checkout's root"
-            )
+        root, programs = checkout_root(), test_programs()
         self._folder = folder
         sources = write_sources(folder, root, constants_of(root), _HOOKS)
         compile_sources(folder / LIBRARY, folder, root, sources, ())
@@ -110,6 +104,21 @@ class Tests:
         except subprocess.TimeoutExpired:
             return False
         return done.returncode == 0
+
+
+def test_programs() -> list[Path]:
+    """The C tests of the core in float32, as the preset `host` builds them.
+
+    Raises:
+        UsageError: they are not built.
+    """
+    programs = sorted((checkout_root() / "build" / "host" / "tests" / "c").glob("test_*_f32"))
+    if not programs:
+        raise UsageError(
+            "constants: the C tests are not built; run  cmake --preset host && cmake --build"
+            " --preset host  in the checkout's root"
+        )
+    return programs
 
 
 def protecting(tests: Tests, constants: Sequence[Constant]) -> dict[str, list[str]]:
