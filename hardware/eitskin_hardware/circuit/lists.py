@@ -83,7 +83,12 @@ def parts_page(design: Design) -> str:
         " package and pins with the data sheet before you order.",
         "",
         f"**Together about {total_usd(design):.0f} USD**, without the skin, its container, tools"
-        " and shipping.",
+        " and shipping, and without a source of 9 to 36 V for the converter. For"
+        " [bring-up](../../docs/guide/bring-up.md) you also need sixteen resistors of 1 kΩ and one"
+        " of 10 kΩ, a multimeter and an oscilloscope.",
+        "",
+        "Nobody has made a layout of the bare circuit board yet ([what"
+        " remains](../README.md#what-remains-for-a-person)); until then it is perforated board.",
         "",
         *_table(parts_list(design)),
         "",

@@ -204,6 +204,6 @@ ORDERS = (
 EXTRAS = (
     Order("", "", "Mean Well", "NSD05-12D15", "isolated converter to ±15 V, 5 W, from 9 to 36 V", "a laboratory supply; medical grade if people touch the skin", 20.0),
     Order("", "", "", "", "pin headers for CN11 and CN12, two rows, 2.54 mm", "any", 4.0),
-    Order("", "", "", "", "ribbon cable 32 wires, 0.3 m, with a 2 x 16 socket", "any", 5.0),
+    Order("", "", "", "", "ribbon cable 32 wires, 0.3 m, with a 2 x 16 socket; split it into single wires below 10 cm", "any", 5.0),
     Order("", "", "", "", "bare circuit board of the shield, two or four layers", "perforated board and adapters for TSSOP and MSOP", 20.0),
 )  # fmt: skip

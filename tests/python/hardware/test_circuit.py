@@ -101,6 +101,13 @@ def test_the_csv_counts_every_part_once():
     assert total == pytest.approx(total_usd(instrument()))
 
 
+@pytest.mark.parametrize("page", ["README.md", "docs/guide/faq.md", "docs/guide/hardware.md"])
+def test_pages_name_the_price_of_the_parts(page):
+    price = f"about {round(total_usd(instrument()), -1):.0f} US dollars"
+    text = (MADE.parents[1] / page).read_text(encoding="utf-8")
+    assert price in " ".join(text.split())
+
+
 def test_the_logic_lines_lead_to_the_firmwares_pins():
     """Each line of a multiplexer is reached from its pin through 1 kohm; see test_hardware_page for
     the pins."""
