@@ -67,6 +67,7 @@ def draw_limit(path: Path, tables: Mapping[str, Sequence[Mapping[str, Any]]]) ->
             ]
             axes.set_xticks(range(len(rows)), labels, rotation=90, fontsize=7.5)
             axes.set_yscale("log")
+            axes.tick_params(axis="y", which="minor", left=False)
             axes.set_title(TITLES[name])
             axes.set_xlim(-0.7, len(rows) - 0.3)
             plain_axes(axes, "y")
