@@ -62,7 +62,7 @@ static inline void check_equal(long long got, long long want, const char *file, 
 #define CHECK(condition) check_that((condition) != 0, __FILE__, __LINE__, #condition)
 #define CHECK_NEAR(value, expected, tolerance) \
     check_near((double)(value), (double)(expected), (double)(tolerance), __FILE__, __LINE__, #value)
-/* Of whole numbers, statuses, enums. */
+/* Compares whole numbers, statuses and enums. */
 #define CHECK_EQUAL(value, expected) \
     check_equal((long long)(value), (long long)(expected), __FILE__, __LINE__, #value)
 #define CHECK_OK(call)      CHECK_EQUAL(call, EITS_OK)

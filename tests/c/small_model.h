@@ -82,8 +82,8 @@ void small_model_hash(small_model *model, uint32_t electrodes, uint32_t rows, co
 /* Write the checksum again after bytes were changed. */
 void small_model_seal(small_model *model);
 
-/* Where the section with this tag starts, and its 16-byte entry in the table; both abort if it is
- * absent. */
+/* The start of the section with this tag, and its 16-byte entry in the table of sections. Both
+ * abort if there is no such section. */
 uint8_t *small_model_section(const small_model *model, const char *tag, uint32_t *size);
 uint8_t *small_model_entry(const small_model *model, const char *tag);
 

@@ -1,4 +1,4 @@
-/* What most tests of the core include, and the steps that they have in common. */
+/* Headers and steps that most tests of the core share. */
 #ifndef EITSKIN_TEST_STEPS_H
 #define EITSKIN_TEST_STEPS_H
 

@@ -1,5 +1,5 @@
-/* What a user reaches of a context without looking into it: examined frames, and a state that is
- * put by and taken up again. */
+/* Functions that read a context from outside: they examine frames, and save and restore the state.
+ */
 #include "steps.h"
 
 enum { RANK = 13, SIDE = 6, N = SIDE * SIDE };
@@ -114,7 +114,7 @@ TEST(a_refused_frame_leaves_no_basis)
         tare(ctx[k], 1, 1);
         reconstruct(ctx[k], 7, 0, NULL);
     }
-    /* two unknown rows, and a third that its reciprocal does not bear out */
+    /* two unknown rows, and a third whose reciprocal differs */
     const eits_fold fold = ctx[0]->model->fold[SMALL_FOLDED - 2];
     make_frame(ctx[0], 8, 2, frame);
     frame[fold.first] *= R(3);

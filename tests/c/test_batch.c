@@ -63,7 +63,8 @@ TEST(each_as_if_alone)
     dense_bench_close(&alone.on);
 }
 
-/* What is not wanted is not looked for; a frame of another length is refused by itself. */
+/* Outputs that are not asked for are not computed. Frames of another length are rejected, each with
+ * its own status. */
 TEST(without_outputs)
 {
     eits_context *ctx = set_up(&b);

@@ -1,5 +1,6 @@
-/* What the test of touches weighs by, written out in double: the covariance of the data's errors
- * and its factor; what the parameters of a disc, and of shapes that are none, move the data by. */
+/* The weights of the touch test, compared with the formulas in double: the covariance of the data's
+ * errors and its factor; and the changes of the data per parameter of a disc, and of other shapes.
+ */
 #include "evidence_bench.h"
 
 #include "frame/fold.h"

@@ -54,8 +54,8 @@ static uint32_t expected_atom(const bench *b, const eits_disc *disc, double *ato
     return covered;
 }
 
-/* What a touch's strength is made of: the covers' sum at its very place; averaged over places, pi
- * (radius^2 + pixel^2 / 12). */
+/* The strength of a touch has a factor, its area. This is the sum of the disc's covers at its
+ * place; the mean over places is pi (radius^2 + pixel^2 / 12). */
 TEST(the_area_is_that_of_the_covers)
 {
     eits_context *ctx = set_up(&b, EITS_STORAGE_F32);
@@ -148,8 +148,8 @@ TEST(far_away_there_is_nothing)
 }
 
 /* Derivatives by x, y and radius against central differences of the response written out in double.
- * Where a pixel's cover has its corner (0 or 1) within the step, the derivative jumps: such discs
- * are passed over. */
+ * If the cover of a pixel reaches 0 or 1 within the step, the derivative jumps; such discs are left
+ * out. */
 static int smooth_around(const bench *b, const eits_disc *disc, double step)
 {
     const eits_model *m = &b->c.model;

@@ -74,7 +74,7 @@ TEST(an_open_electrode_that_floats)
     }
 }
 
-/* Nothing on any row is no matter of electrodes. */
+/* If all rows are dead, the front end is dead, and no electrode is named. */
 TEST(all_dead_is_a_dead_front_end)
 {
     eits_context *ctx = set_up(&b, 1);

@@ -273,7 +273,7 @@ TEST(what_model_errors_could_have_made_goes)
     }
 }
 
-/* What the fit has taken is taken from the test; some is left to it. */
+/* Moves that the fit has made are subtracted from what the test may compute; a minimum is left. */
 TEST(fit_and_test_share_what_may_be_made)
 {
     static const uint32_t moves[] = {0, 10, EITS_STILL_COLUMNS - EITS_STILL_MIN, 1000, UINT32_MAX},

@@ -1,5 +1,5 @@
-/* What the test's numbers mean: how sure of a touch, and of its place; nothing where there was no
- * test; and which frames are said to be crowded for it. */
+/* The numbers of the touch test: the confidence of a touch and the covariance of its place (neither
+ * without a test), and the frames that are called crowded because of them. */
 #include "check.h"
 #include "dense.h"
 #include "small_model.h"
@@ -62,7 +62,8 @@ TEST(places_get_factor_floor_distance_and_what_the_test_would_move)
     ctx->reference.distance = 0;
 }
 
-/* What the correction of places leaves stands in the distance's place, but where there is none. */
+/* If places are corrected, their covariance contains what the correction leaves; otherwise it
+ * contains the part that follows from the distance of the reference. */
 TEST(places_widen_by_what_their_correction_leaves)
 {
     eits_model copy = *ctx->model;

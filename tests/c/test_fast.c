@@ -75,7 +75,7 @@ static double field(const bench *b, uint32_t pixel, uint32_t plus, uint32_t minu
            (double)eits_half_to_float(column[from + minus]);
 }
 
-/* What a finger does to a row, V, from the definition: a mean of E_drive . E_measure. */
+/* The change of a row by a finger, in V, by the definition: a mean of E_drive . E_measure. */
 static double answer(const bench *b, uint32_t i, finger at)
 {
     const eits_model *m = &b->skin.model;
@@ -183,7 +183,7 @@ static uint32_t align(bench *b, eits_real *aligned)
     return state;
 }
 
-/* What was found in the last frame that was aligned. */
+/* Gives the fast path the touches that were found in the last aligned frame. */
 static void find(bench *b, const double (*places)[2], uint32_t count)
 {
     eits_touch found[EITS_MAX_TOUCHES];
@@ -308,7 +308,8 @@ TEST(test_any_unit_of_strength)
     }
 }
 
-/* None of them where one is at the place of a touch that is on, even if that explains nothing. */
+/* No pair is reported if one of its touches is at the place of a known touch, even if the known
+ * touch explains nothing. */
 TEST(test_two_at_once)
 {
     for (uint32_t known = 0; known < 3; ++known) {
@@ -346,13 +347,13 @@ TEST(test_several_fingers)
         drives(b, 24);
         check_reported(b, 1.0);
     }
-    b->fingers = 5; /* five rows a drive are too few for three: frames tell of the others */
+    b->fingers = 5; /* the five rows of a drive show at most two touches; frames find the others */
     confirm_twice(b, places, 5);
     drives(b, 40);
     check_reported(b, 1.0);
     CHECK_OK(eits_fast_touches(b->fast, touches, 2, &count));
     CHECK_EQUAL(count, 2);
-    put(b, 5, 0, 2, 1); /* few rows tell of a sixth */
+    put(b, 5, 0, 2, 1); /* so few rows may or may not show a sixth touch */
     drives(b, 40);
     CHECK(b->fast->count >= 5 && b->fast->count <= EITS_FAST_TOUCHES);
     b->fingers = 5;
@@ -894,8 +895,8 @@ TEST(test_a_touch_that_leaves_the_skin)
     CHECK_EQUAL(b->fast->next_id, 1);
 }
 
-/* Where the reference says that the skin has touches elsewhere: they are reported there, and what
- * whole frames find there is the same touch. */
+/* The reference shows that touches of this skin are displaced. They are reported at the corrected
+ * places, and a touch that a whole frame finds there is the same one. */
 TEST(test_places_that_the_reference_corrects)
 {
     for (int there = 0; there < 2; ++there) {

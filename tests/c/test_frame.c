@@ -72,7 +72,7 @@ static void check_stage(bench *b, uint32_t masked_expected)
     free(v0);
 }
 
-/* What fold k of frame b.frame gives, by the definition of the kind of data. */
+/* The datum of fold k of b.frame, by the definition of the kind of data. */
 static double expected_datum(uint32_t k, eits_data_kind kind, double gain)
 {
     const eits_fold fold = b.on.c.model.fold[k];
@@ -141,7 +141,8 @@ TEST(drift_of_the_gain)
     }
 }
 
-/* What is no number or saturated is left out, counted, and does not reach the data. */
+/* Rows that are NaN, infinite or saturated are left out and counted; they do not change the data.
+ */
 static void check_unusable(eits_data_kind kind, int project)
 {
     eits_context *ctx = set_up(&b, kind, 1, project);
@@ -424,7 +425,8 @@ TEST(directions_that_nearly_agree)
     free(a), free(c);
 }
 
-/* What the two rows of a fold differ by; by less than rounding of their references: nothing. */
+/* The difference of the two rows of a fold counts as zero if it is below the rounding of their
+ * references. */
 TEST(reciprocals_that_agree)
 {
     static const struct {

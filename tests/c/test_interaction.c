@@ -1,5 +1,5 @@
-/* What touches do to each other, against a dense computation with complex numbers; when it is left
- * alone; and v0 log(v / v0). */
+/* The interaction of touches, compared with a dense computation in complex numbers; the cases in
+ * which it is not corrected; and v0 log(v / v0). */
 #include "steps.h"
 
 #include "diagnostics/diagnostics.h"
@@ -313,8 +313,8 @@ TEST(log_data)
     }
 }
 
-/* Where the reference is all but zero there is no ratio: differences stay, halved over both sides.
- */
+/* If the reference is nearly zero, there is no ratio: the difference is used, shared equally by
+ * both sides of the fold. */
 TEST(log_data_without_a_ratio)
 {
     eits_real y[RANK];

@@ -68,7 +68,8 @@ static eits_context *open_joint(int project)
     return ctx;
 }
 
-/* What the shapes add to each fold, as the multipole model has it once its rounds are settled. */
+/* The answers of the shapes in each fold by the multipole model, after its rounds have converged.
+ */
 static void answers_of(eits_context *ctx, const eits_shape *shape, uint32_t count, double *d)
 {
     eits_real value[SMALL_FOLDED];

@@ -416,7 +416,8 @@ TEST(proximal_steps)
     }
 }
 
-/* A number that is none comes out as none, wherever it stands: not as a coefficient at rest. */
+/* If a gradient is not finite, its coefficient is not finite either, at every place; it does not
+ * become zero. */
 TEST(steps_that_are_not_finite)
 {
     enum { COUNT = 19 };

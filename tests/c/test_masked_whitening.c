@@ -4,8 +4,8 @@
 
 #include "eitskin/touch.h"
 
-/* What the core states of its numbers: the regularisation's law, how little a lost direction
- * counts, the margin of the step. */
+/* Numbers that the core documents: the law of the regularisation, the weight of a lost direction,
+ * the margin of the step. */
 static const double LOST = 0.01, MARGIN = 0.995, MIN_FRACTION = 0.1, NOISE_FACTOR = 5, MAX = 1;
 
 /* In place, by Gauss-Jordan; the matrix is positive definite. */

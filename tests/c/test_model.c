@@ -4,7 +4,7 @@
 
 static const small_spec TINY = {.rank = 3, .side = 3};
 
-/* What a model that could not be opened must leave as it was. */
+/* Opens a model; if that fails, the structure must be unchanged. */
 static eits_status open_untouched(const void *blob, size_t size)
 {
     eits_model model, before;
@@ -248,7 +248,8 @@ TEST(unknown_and_repeated_sections)
     CHECK_OK(with_entry(TINY, "META", 8, 0));
 }
 
-/* What a model says of its whitening must fit its P and itself; a model may say nothing. */
+/* The sections about a model's whitening must agree with its P and with each other; a model may
+ * also have none of them. */
 TEST(row_forms)
 {
     const small_spec spec = {.rank = 5, .side = 6, .shape = SMALL_WHITENED};

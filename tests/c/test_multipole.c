@@ -361,8 +361,8 @@ static void shift_induced(eits_context *ctx, uint32_t k, const eits_real *held, 
     }
 }
 
-/* Of discs all four are analytic. An ellipse's by radius and shape are differences by
- * EITS_POLE_STEP, which curvature puts off by .5 to .8 %. */
+/* The four slopes of a disc are analytic. The slopes of an ellipse by radius and shape are
+ * differences with the step EITS_POLE_STEP, whose error by curvature is .5 to .8 %. */
 TEST(slopes_equal_central_differences)
 {
     static const double analytic = BOTH_WIDTHS(3e-4, 1e-5);
@@ -430,7 +430,7 @@ enum { CENTRED, STRAIGHT, ELSEWHERE, RIMS };
 static const double LINE = 13, OTHER_RIM = 9;
 static const double complex OTHER_MIDDLE = 5 + 8 * I;
 
-/* Where z lies mirrored in the rim. */
+/* The mirror image of z in the rim. */
 static double complex mirrored(double complex z, int rim)
 {
     const double complex middle = rim == CENTRED ? MIDDLE * (1 + I) : OTHER_MIDDLE;

@@ -1,5 +1,4 @@
-/* What is found wrong with a frame, and what is left out because of it; outliers in reference
- * frames.
+/* Outliers of a frame and the rows that are left out because of them; outliers in reference frames.
  */
 #include "spoiled_frame.h"
 
@@ -14,8 +13,8 @@ TEST(a_clean_frame_has_no_diagnostics)
     }
 }
 
-/* The small model's P is arbitrary: nothing predicts, so both sides of a fold go; the noise is
- * known or told by all folds. */
+/* The small model's P is arbitrary, so that no row predicts another: both sides of a fold are left
+ * out. The noise is known, or estimated from all folds. */
 TEST(one_outlier_is_left_out)
 {
     for (int known = 0; known < 2; ++known) {

@@ -136,8 +136,8 @@ static void look_for(eits_context *ctx, uint32_t diagnostics, uint32_t max_maske
     CHANGE_OPTIONS(ctx, o.diagnostics = diagnostics, o.max_masked = max_masked);
 }
 
-/* What was wrong with the rows themselves; the small model's touches are nothing to tell crowds by.
- */
+/* Returns the diagnostics of the rows, without `crowded`, which means nothing for the touches of
+ * the small model. */
 static uint32_t reconstruct(bench *b)
 {
     CHECK_OK(eits_reconstruct(b->on.c.ctx, b->frame, SMALL_ROWS, NULL, NULL));
@@ -206,8 +206,8 @@ TEST(one_outlier_of_a_half_scan)
     }
 }
 
-/* Which of several it is cannot be told without reciprocals; and reciprocals that differ by noise
- * bear each other out. */
+/* Without reciprocals the core cannot decide which of several rows is the outlier. Reciprocals that
+ * differ by no more than noise are no outliers. */
 TEST(mismatches_that_are_no_outlier)
 {
     eits_context *ctx = set_up(&b, 1);
@@ -248,7 +248,7 @@ TEST(mismatches_that_are_no_outlier)
     CHECK_EQUAL(ctx->info.masked, 0);
 }
 
-/* How far the gain drifted is no news; an outlier beside it is. */
+/* A drift of the gain causes no mismatch if it is projected out; an outlier beside it is found. */
 TEST(drift_is_no_mismatch)
 {
     eits_context *ctx = set_up(&b, 0);
@@ -279,7 +279,7 @@ TEST(drift_is_no_mismatch)
     }
 }
 
-/* Of a fold whose sides differ, the side that the others bear out stays. */
+/* If the two sides of a fold differ, the side that the other rows predict stays. */
 TEST(the_wrong_side_goes)
 {
     for (int kind = 0; kind < 3; ++kind) {

@@ -69,7 +69,7 @@ static int pass(bench *b, int count, int untouched)
     return moved;
 }
 
-/* How far row i's reference went of the way to the frame. */
+/* The fraction of the way to the frame by which the reference of row i has moved. */
 static double gone(const bench *b, uint32_t i)
 {
     return (double)((b->on.c.ctx->reference.v0[i] - b->untouched[i]) /

@@ -55,7 +55,8 @@ TEST(what_is_no_precision_is_refused)
     CHECK_EQUAL(opened(1, bytes, SIZE), EITS_E_MODEL_VALUE);
 }
 
-/* Of 21 folds 16 directions are made: five may be filled in, of six all would be a guess. */
+/* 16 directions are made from 21 folds: five missing folds can be filled in. With six missing ones
+ * all of them would be guesses. */
 TEST(as_many_are_filled_in_as_are_spare)
 {
     enum { MANY = 16 };

@@ -1,5 +1,5 @@
-/* What lies in the scratch, and in the gaps between arrays, makes no difference to a result: it is
- * nobody's. */
+/* The former contents of the scratch memory, and of the gaps between arrays, do not change a
+ * result. */
 #include "steps.h"
 
 enum { RANK = 12, SIDE = 12, N = SIDE * SIDE, FRAMES = 24, KEPT_NOISE = 6 };

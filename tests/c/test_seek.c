@@ -257,7 +257,7 @@ TEST(the_tare_says_that_the_instrument_is_far)
     CHECK_EQUAL(tared(ctx, 2 * limit, 0).far, 0);
 }
 
-/* What the test may have left of a frame: one disc, far from what the data say. */
+/* A fit as the touch test may leave it: one disc, far from the place that the data show. */
 static eits_fit one_left(eits_context *ctx, double confidence)
 {
     eits_fit f = eits_fit_none(ctx, &ctx->scratch);

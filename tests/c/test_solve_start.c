@@ -1,5 +1,5 @@
-/* Where a solve starts from, and what it may not take over: after a halved step, from a start worse
- * than zero, over another stage's scratch, after a frame that was refused or empty. */
+/* The start of a solve. It must not use a start that is worse than zero, nor what is left of a
+ * halved step, of another stage's scratch, or of a frame that was rejected or empty. */
 #include "steps.h"
 
 static dense_bench b;

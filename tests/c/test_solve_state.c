@@ -1,4 +1,4 @@
-/* What the solver takes from outside one frame: detection threshold and lambda rule, warm start, a
+/* Influences on a solve from outside the frame: detection threshold and lambda rule, warm start, a
  * wrong step, units. */
 #include "steps.h"
 
@@ -50,7 +50,7 @@ TEST(detection_threshold_and_lambda_rule)
     ctx->reference.lambda_noise = (eits_real)(0.5 * top);
     info = solve(ctx);
     CHECK_NEAR(info.lambda, 0.25 * top, 2 * EPS * top);
-    /* goes before both */
+    /* lambda_abs overrides both */
     CHANGE_OPTIONS(ctx, o.lambda_abs = (eits_real)(0.6 * top));
     info = solve(ctx);
     CHECK_NEAR(info.lambda, 0.6 * top, 2 * EPS * top);
@@ -203,7 +203,7 @@ TEST(ending_above_the_start)
     }
 }
 
-/* Of FISTA and of FISTA on a working set. */
+/* The step of FISTA, and of FISTA on a working set, is absurdly large. */
 TEST(step_absurdly_large)
 {
     static const struct {

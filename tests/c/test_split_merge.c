@@ -269,7 +269,7 @@ TEST(one_peak_two_touches)
     for (uint32_t j = 0; j < b.c.model.n_pixels; ++j) /* one peak */
         ctx->solver.image[j] =
             b.c.model.pixel[j].ix == SIDE / 2 && b.c.model.pixel[j].iy == SIDE / 2 ? 1 : 0;
-    /* of bent data, as far as it knows: two peaks' worth of bend is no touch */
+    /* without log data nothing is split: non-linearity would look like another touch */
     CHECK_EQUAL(found(ctx, EITS_TOUCH_FIT_ALL, touch), 1);
     eits_copy(ctx->frame.y_log, ctx->frame.y, EITS_STRIDE(RANK));
     ctx->frame.has_y_log = 1;

@@ -139,7 +139,8 @@ TEST(both_signs)
     CHECK_EQUAL(b.count, 1);
     (void)check_found(&b, pair[1], 1, 0.05);
     CHANGE_OPTIONS(ctx, o.sign = EITS_SIGN_INCREASE);
-    press(&b, pair + 1, 1, 0); /* what is only weaker elsewhere is no touch of this sign */
+    press(&b, pair + 1, 1,
+          0); /* places at which a decrease is only weaker are not touches of the other sign */
     for (uint32_t k = 0; k < b.count; ++k)
         CHECK(b.found[k].strength_s_per_m_mm2 >= 0 &&
               (double)b.found[k].strength_s_per_m_mm2 < 0.5 * fabs(strength(pair[1])));

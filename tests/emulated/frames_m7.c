@@ -121,7 +121,7 @@ static int fail(const char *what)
     return 0;
 }
 
-/* An option by its name; 0 for one that is none. */
+/* Sets an option by its name; returns 0 if there is no such option. */
 static int set_option(const char *name, double value)
 {
     uint32_t count;
@@ -288,7 +288,7 @@ static void play_drive(eits_fast *fast, uint32_t drive, uint32_t time_us)
     printf("\n");
 }
 
-/* What the solver says of the scan goes back to the fast path. */
+/* Gives the solver's touches of the scan back to the fast path. */
 static void end_scan(eits_fast *fast)
 {
     eits_touch touches[EITS_MAX_TOUCHES];

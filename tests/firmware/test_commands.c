@@ -363,7 +363,7 @@ TEST(test_stats_again)
           1);
 }
 
-/* Which commands are refused while a tare is under way. */
+/* Commands that are refused during a tare. */
 TEST(test_busy)
 {
     eits_command_tare tare = {.request = 8000, .frames = 50};

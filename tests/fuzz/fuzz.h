@@ -1,5 +1,5 @@
-/* What the fuzz targets share. A target is LLVMFuzzerTestOneInput of its file; clang's libFuzzer
- * calls it with bytes of its own making, replay.c with files, under any compiler. */
+/* Functions that the fuzz targets share. A target is LLVMFuzzerTestOneInput of its file; clang's
+ * libFuzzer calls it with bytes of its own making, replay.c with files, under any compiler. */
 #ifndef EITSKIN_FUZZ_H
 #define EITSKIN_FUZZ_H
 
@@ -31,8 +31,8 @@ uint8_t fuzz_u8(fuzz_bytes *b);
 uint32_t fuzz_u32(fuzz_bytes *b);
 float fuzz_f32(fuzz_bytes *b);
 
-/* What comes out: replay.c sums it up by name and compares that with sums.txt, for a wrong number
- * may break nothing that must hold. A fuzzer does nothing here. Every NaN is the same one. */
+/* Notes a result. replay.c adds results up by name and compares the sums with sums.txt, because a
+ * wrong number may violate none of the checks. A fuzzer does nothing here. All NaN count as one. */
 void fuzz_note(const char *name, const void *bytes, size_t size);
 void fuzz_note_reals(const char *name, const eits_real *numbers, size_t count);
 void fuzz_note_floats(const char *name, const uint8_t *bytes, size_t count);
@@ -48,12 +48,12 @@ extern fuzz_sum fuzz_sums[FUZZ_SUMS + 1]; /* the last without a name */
 extern int fuzz_sums_wanted;
 void fuzz_end_input(void);
 
-/* What must hold after eits_reconstruct on `ctx` returned `status`: all numbers finite, the image
- * zero on an error, certificates not negative, the residual no worse than that of zero, limits
- * kept. `frame_macs`: what the frame stage alone may have cost. */
+/* Checks the results after eits_reconstruct on `ctx` returned `status`: all numbers finite, the
+ * image zero on an error, certificates not negative, the residual no worse than that of zero,
+ * limits kept. `frame_macs`: what the frame stage alone may have cost. */
 void fuzz_check_result(const eits_context *ctx, eits_status status, uint64_t frame_macs);
 
-/* What must hold of the touches that eits_find_touches gave. */
+/* Checks the touches that eits_find_touches gave. */
 void fuzz_check_touches(const eits_context *ctx, const eits_touch *touches, uint32_t count);
 
 /* Room for a workspace, from a 64-byte boundary. */

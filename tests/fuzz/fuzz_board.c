@@ -163,7 +163,7 @@ static void check_packet(const eits_link_packet *packet)
     }
 }
 
-/* What was dropped for want of room has used up a number. */
+/* A packet that was dropped because the queue was full has used up a sequence number. */
 static void listen(void)
 {
     static eits_link_decoder decoder;
@@ -260,7 +260,7 @@ static void run(uint32_t bursts)
         turn();
 }
 
-/* What was sent is read: a turn takes 256 bytes. */
+/* Lets the board read all that was sent: it takes 256 bytes per turn. */
 static void hear_out(void)
 {
     while (fake.to_board_size > 0)

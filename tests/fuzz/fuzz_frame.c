@@ -30,7 +30,8 @@ static void spoil(small_model *made, uint32_t which)
     small_model_seal(made);
 }
 
-/* What a taught model has: the rows' precision, of which each leans a little on all others. */
+/* Adds the precision matrix of the rows, as a taught model has it: each row depends a little on all
+ * others. */
 static void add_precision(small_model *made)
 {
     enum { PACKED = SMALL_FOLDED * (SMALL_FOLDED + 1) / 2 };

@@ -131,7 +131,7 @@ static double field(uint32_t pixel, uint32_t plus, uint32_t minus, uint32_t from
     return (double)eits_half_to_float(column[plus]) - (double)eits_half_to_float(column[minus]);
 }
 
-/* What the fingers do to a row: a sum of E_drive . E_measure. */
+/* The change of a row by the fingers: a sum of E_drive . E_measure. */
 static double answer(uint32_t row)
 {
     const uint8_t *pins = model.protocol + 4 * (size_t)row;

@@ -154,8 +154,8 @@ static void fingers(void)
     }
 }
 
-/* Of the board: every command as usual and with an odd field; every model uploaded, also with the
- * power gone at some write; every fault in a running stream. */
+/* Seeds of the board: every command, with usual fields and with an odd one; an upload of every
+ * model, also with a loss of power at some write; every fault in a running stream. */
 static void boards(void)
 {
     for (unsigned k = 0; k < 12 * 14; ++k) { /* 0, 1 and the greatest in every field */

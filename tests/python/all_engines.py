@@ -8,8 +8,8 @@ from eitskin.solve.reconstructor import ENGINES, Reconstructor
 
 
 class AllEngines(dict[str, Reconstructor]):
-    """What is asked of it is asked of each: ``all_engines.tare(untouched)`` has every reference as
-    learned, by engine."""
+    """Passes each call to every engine, and returns the results by engine:
+    ``all_engines.tare(untouched)`` has the reference that each of them learned."""
 
     def __init__(
         self,

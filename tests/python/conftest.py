@@ -1,4 +1,4 @@
-"""What every Python test may use."""
+"""Fixtures and settings for all Python tests."""
 
 from collections.abc import Iterator
 from importlib.util import find_spec

@@ -57,7 +57,7 @@ class Host(CoreEngine):
     """A context that keeps on after an error and gives its status."""
 
     def status_of(self, step: Choose | TareStep) -> int:
-        """Of options or untouched frames, as the C core itself sees them."""
+        """Return the C core's status for options or untouched frames."""
         if isinstance(step, Choose):
             try:
                 self.set_options(step.options)
@@ -77,7 +77,7 @@ class Host(CoreEngine):
         return int(status)
 
     def outcome(self, numbers: np.ndarray, reduced: bool = False) -> Outcome:
-        """Of one frame, or of one vector of reduced data."""
+        """Return the outcome of one frame, or of one vector of reduced data."""
         if reduced:
             reduced_data = self._reals(np.array(numbers, dtype=self.dtype))
             status = int(self._lib.eits_solve(self._context, reduced_data))
@@ -167,8 +167,8 @@ class SameEverywhere:
         options: Options | None = None,
         masked: np.ndarray | None = None,
     ) -> list[Outcome]:
-        """Of frames (k, m) after a tare on untouched frames (q, m), volts, which must be taken;
-        None: the model's options."""
+        """Return the outcomes of frames (k, m) after a tare on untouched frames (q, m), in V. The
+        tare must succeed. ``options`` None: those of the model."""
         chosen = options or default_options(decode_model(blob, "model"))
         masks = [] if masked is None else [Mask(masked)]
         statuses, outcomes = self.steps(
@@ -178,8 +178,8 @@ class SameEverywhere:
         return outcomes
 
     def steps(self, steps: Sequence[Step]) -> tuple[list[int], list[Outcome]]:
-        """Of any steps: statuses of models, options and tares, and outcomes. Many models a call:
-        each start of QEMU takes a second."""
+        """Run steps, and return the statuses of models, options and tares, and the outcomes. Give
+        many models per call, because each start of QEMU takes a second."""
         statuses, own = on_host(steps)
         for prepared, portable in ((False, False), (False, True)):
             others, plain = on_host(steps, prepared=prepared, portable=portable)

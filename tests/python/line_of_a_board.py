@@ -15,7 +15,7 @@ from small_models import prebuilt
 
 @cache
 def untouched() -> BoardFrames:
-    """Of a skin that nobody touches."""
+    """Return the frames of an untouched skin."""
     return BoardFrames(Scene("untouched", frames=10, quiet_frames=8, elements=1500))
 
 

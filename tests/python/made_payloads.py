@@ -1,4 +1,4 @@
-"""What a board sends as bytes: the other way of ``payloads.parse``."""
+"""Makes the bytes that a board sends: the inverse of ``payloads.parse``."""
 
 from dataclasses import astuple
 

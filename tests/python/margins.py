@@ -20,7 +20,7 @@ FILE = "EITSKIN_MARGINS_FILE"
 
 
 def share(measured: float, bound: float) -> float:
-    """Of the bound that is used up: 1 is at the bound; 0 where nothing was measured."""
+    """Return the share of the bound that is used: 1 at the bound, 0 if nothing was measured."""
     if measured <= 0:
         return 0.0
     return measured / bound if bound > 0 else float("inf")

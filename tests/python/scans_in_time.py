@@ -72,9 +72,9 @@ class TrueInTime:
 
 @dataclass(eq=False)
 class Outcome:
-    """What was reported of one scene: false touches; of each finger the delay of its first report
-    and the error then (or None), and the errors after each drive; counts of frames; how many
-    touches after each drive."""
+    """Reports of one scene: false touches; for each finger the delay of its first report and the
+    error then (or None), and the errors after each drive; counts of frames; the number of touches
+    after each drive."""
 
     false: int = 0
     first: list[tuple[float, float] | None] = field(default_factory=list)
@@ -366,7 +366,7 @@ def glitches(
 
 
 def _rows_of_one(player: Player, scan: Scan, rng: np.random.Generator) -> np.ndarray:
-    """Which rows (t, 2) drive, and measure, with an electrode that fails."""
+    """Return which rows (t, 2) drive with a failing electrode, and which measure with it."""
     protocol = player.model.protocol
     table = protocol.drive_measure[scan.row] == rng.integers(protocol.n_electrodes)
     return table.reshape(-1, 2, 2).any(axis=2) & (scan.time_s[:, None] > FAULT_S)

@@ -30,7 +30,7 @@ NOT_COMPILED = {
 
 @dataclass(frozen=True)
 class Row:
-    """Of one file, or all: what was reached and how many there are."""
+    """Counts for one file, or for all: how many were reached, and how many there are."""
 
     name: str
     lines: tuple[int, int]

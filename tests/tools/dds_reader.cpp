@@ -1,4 +1,4 @@
-// Reads topics by eProsima Fast DDS, which ROS 2 uses unless told otherwise, and prints each
+// Reads topics by eProsima Fast DDS, which ROS 2 uses by default, and prints each
 // message as "TOPIC HEX", with the CDR encapsulation before. It knows nothing of the types but
 // their names:
 //     dds_reader DOMAIN SECONDS TOPIC TYPE [TOPIC TYPE]...

@@ -1,4 +1,5 @@
-"""Which places in the core's sources refuse something, and what a test run must have done at each.
+"""Finds the places in the core's sources that refuse something, and checks what a test run did
+there.
 
 A *site* is one of these, found in the text (comments and preprocessor lines aside):
 
@@ -126,7 +127,7 @@ def find_sites(file: str, source: str) -> list[Site]:
 
 
 def find_missed(site: Site, counts: FileCounts) -> list[Missed]:
-    """Where the counts fall short of what the site asks for."""
+    """Return the lines and branches of the site that no test has reached as required."""
     lines = range(site.span.first, site.span.last + 1)
     if not any(counts.lines.get(line, 0) for line in lines):
         return [Missed(site, site.span.first, "never run")]
@@ -250,7 +251,7 @@ def _split_head(span: Span, head: re.Match[str]) -> tuple[Span, Span]:
 
 
 def sites_below(root: Path, folder: str) -> list[Site]:
-    """Of every C source and header in ``root / folder``."""
+    """Return the sites of every C source and header in ``root / folder``."""
     files = sorted([*(root / folder).rglob("*.c"), *(root / folder).rglob("*.h")])
     return [
         site

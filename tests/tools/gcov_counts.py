@@ -1,5 +1,5 @@
-"""What gcov counted: how often each line ran and each branch was taken, summed over the objects
-that a source is in."""
+"""Counts of gcov: how often each line ran and each branch was taken, summed over the objects that
+contain a source."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from typing import Any
 
 @dataclass
 class FileCounts:
-    """Of one source: a count for each line that has code; for each line with branches, how often
-    each was taken."""
+    """Counts of one source: for each line with code, how often it ran; for each line with branches,
+    how often each was taken."""
 
     lines: dict[int, int] = field(default_factory=dict)
     branches: dict[int, list[int]] = field(default_factory=dict)

@@ -1,5 +1,5 @@
-"""Where touches are found on frames of the exact model of a round skin: the joint fit, and what
-its absence costs."""
+"""Errors of places on frames of the exact model of a round skin, with the joint fit and without
+it."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -70,7 +70,7 @@ def found_by(
 
 
 def found_in(one: Frames) -> Matching:
-    """What is found in one scene's frame, matched."""
+    """Reconstruct one scene's frame, and match the found touches with the true ones."""
     solver = Reconstructor(prebuilt()[0])
     solver.tare(one.untouched_v)
     found = solver.reconstruct(one.touched_v).touches

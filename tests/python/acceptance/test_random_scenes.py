@@ -1,5 +1,5 @@
-"""What the prebuilt model must do on random touches that it has never seen: one to three, 6 to 12
-mm, contrast 3 to 10, 60 dB.
+"""Accuracy that the prebuilt model must reach on random touches that were not used to choose it:
+one to three, 6 to 12 mm, contrast 3 to 10, 60 dB.
 
 Frames are simulated nonlinearly on a mesh four times finer than the model's, with contact
 impedances spread by 20 %, white noise and a 12-bit converter. The threshold of the image's mask is

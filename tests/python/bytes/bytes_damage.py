@@ -80,8 +80,8 @@ def any_bytes(
 
 
 def read_or_refuse(read: Callable[..., Content], *given: Any, **named: Any) -> Content | None:
-    """What ``read`` gives of what is ``given``, or None where it refuses; fails where it raises
-    anything but an EitskinError of one line, or warns."""
+    """Return the result of ``read`` for ``given``, or None if it refuses. Fail if it warns, or
+    raises anything but an EitskinError of one line."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:

@@ -156,7 +156,7 @@ def test_presses_that_unpack_to_far_more(tmp_path):
 
 @pytest.mark.parametrize("drawn", [True, False])
 def test_arrays_of_a_million_blocks(tmp_path, drawn):
-    """Of blocks that are empty, too: they would be made all the same."""
+    """A million blocks are refused even if they are empty, because each would be made."""
     document = ezdxf.new()
     document.header["$INSUNITS"] = 4
     block = document.blocks.new("B")

@@ -12,7 +12,7 @@ from eitskin.tuning.front import load_front
 
 
 def small_front() -> bytes:
-    """What ships, of two operating points only."""
+    """The file of operating points that comes with eitskin, cut to two points."""
     whole = json.loads(resources.files("eitskin.tuning").joinpath("front.json").read_bytes())
     return json.dumps({**whole, "points": whole["points"][:2]}).encode()
 

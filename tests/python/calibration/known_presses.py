@@ -21,7 +21,7 @@ def places(count: int) -> npt.NDArray[np.float64]:
 
 
 def gain_of(place_mm: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """What a strength is to be multiplied by: tilted and bent."""
+    """The factor of a strength at a place: a gain that is tilted and bent over the skin."""
     u, v = place_mm.T / RADIUS_MM
     return np.asarray(1 + 0.1 * u - 0.05 * v + 0.3 * (u**2 + v**2))
 

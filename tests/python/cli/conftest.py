@@ -95,8 +95,8 @@ def done(capsys) -> Callable[..., str]:
 
 @pytest.fixture
 def json_of(done) -> Callable[..., Any]:
-    """What the command says with ``--json``, in JSON as the standard has it: NaN and Infinity are
-    none."""
+    """Return the output of a command with ``--json``. It must be standard JSON, without NaN and
+    Infinity."""
 
     def refuse(name: str) -> None:
         raise AssertionError(f"{name} is no JSON")

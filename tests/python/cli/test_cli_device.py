@@ -102,7 +102,7 @@ def test_raw_lines_tell_of_the_scan(done, scene):
     ],
 )
 def test_scan_options_reach_the_board(options, expected, done, json_of, scene, tmp_path):
-    """What a recording says of the board was asked after the scan was set."""
+    """The properties of the board in a recording were read after the scan was set."""
     run = tmp_path / "run.eits"
     done(f"record --device sim:{scene} -o {run} --frames 1", options)
     board = json_of(f"info --device file:{run}")["board"]

@@ -1,6 +1,6 @@
-"""What the commands for boards refuse: the documented exit code, one line that says what to do, no
-traceback, no file left. tests/python/docs/mistakes.md has those that users make most, which are not
-repeated here."""
+"""Refusals of the commands for boards: each has the documented exit code and one line that says
+what to do, without a traceback, and leaves no file. tests/python/docs/mistakes.md has the most
+frequent mistakes, which are not repeated here."""
 
 import re
 from pathlib import Path

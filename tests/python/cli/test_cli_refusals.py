@@ -1,6 +1,6 @@
-"""What the command line refuses: the documented exit code, one line that says what to do, no
-traceback, no file left. tests/python/docs/mistakes.md has those that users make most, which are not
-repeated here."""
+"""Refusals of the command line: each has the documented exit code and one line that says what to
+do, without a traceback, and leaves no file. tests/python/docs/mistakes.md has the most frequent
+mistakes, which are not repeated here."""
 
 import io
 import struct

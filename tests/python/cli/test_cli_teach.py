@@ -1,4 +1,5 @@
-"""What ``eitskin teach`` refuses: one line that says which press and what to do, and no file."""
+"""Refusals of ``eitskin teach``: one line says which press is wrong and what to do, and no file is
+written."""
 
 from collections.abc import Callable
 from functools import cache

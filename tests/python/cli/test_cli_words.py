@@ -1,4 +1,4 @@
-"""What the command line says beside results: how long is left, lists that end, completion."""
+"""Output of the command line beside results: the time that is left, lists that end, completion."""
 
 import subprocess
 

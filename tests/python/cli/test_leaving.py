@@ -107,8 +107,8 @@ class LinePort:
 
 
 def misbehave(master: int, state: State, end: threading.Event, half: bytes) -> None:
-    """What a port does that is there but not well: bytes without end, half a packet, nothing; one
-    that is deaf does not even take what is sent."""
+    """Behave like a broken device on an existing port: send bytes without end, half a packet, or
+    nothing. A deaf one does not even read what is sent."""
     os.set_blocking(master, False)
     if state == "half":
         os.write(master, half)

@@ -28,7 +28,7 @@ def tool(*names: str) -> str:
 
 
 def run(*command: str | Path) -> str:
-    """What the command prints.
+    """Run the command and return its output.
 
     Raises:
         AssertionError: it fails; with what it said.

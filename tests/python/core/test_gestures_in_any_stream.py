@@ -1,4 +1,4 @@
-"""What holds of events in any stream of touches, sensible or not."""
+"""Properties of events that hold for any stream of touches, sensible or not."""
 
 from collections import Counter
 from collections.abc import Iterable

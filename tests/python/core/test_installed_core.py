@@ -19,7 +19,7 @@ EXAMPLES = ROOT / "examples" / "c"
 
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory) -> Path:
-    """Where the core is installed."""
+    """Install the core, and return the folder."""
     folder = tmp_path_factory.mktemp("installed")
     run("cmake", "--install", build_core(), "--component", "core", "--prefix", folder)
     return folder
@@ -36,7 +36,7 @@ def programs(prefix, tmp_path_factory) -> Path:
 
 @pytest.mark.parametrize("program", ["minimal", "minimal_double", "minimal_cpp"])
 def test_an_example_finds_the_touches_that_python_finds(programs, program):
-    """Those of the prebuilt model's golden frame."""
+    """Both find the touches of the prebuilt model's golden frame."""
     with resources.as_file(resources.files("eitskin.model") / "paper.eitm") as file:
         text = run(programs / program, file)
     model, _ = load_prebuilt()

@@ -66,8 +66,8 @@ def module_of(path: Path) -> str:
 
 
 def includes(text: str) -> list[str]:
-    """Of the core's own files, as "frame/fold.h"; public headers ("eitskin/...") are no
-    module's."""
+    """List the included files of the core, such as "frame/fold.h", without public headers
+    ("eitskin/..."), which belong to no module."""
     names = re.findall(r'^\s*#\s*include\s*"([^"]+)"', text, re.M)
     return [name for name in names if not name.startswith("eitskin/")]
 

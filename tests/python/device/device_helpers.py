@@ -44,7 +44,7 @@ def scene(elements: int = 2500) -> Scene:
 
 @cache
 def frames(elements: int = 2500) -> BoardFrames:
-    """Of ``scene``, shared, so that it is simulated once."""
+    """Return the frames of ``scene``. They are shared, so that the scene is simulated once."""
     return BoardFrames(scene(elements))
 
 
@@ -61,7 +61,7 @@ def sim_board(
 
 
 def stats_of(board: SimBoard) -> BoardStats:
-    """What ``board`` counts, asked past any line, each time."""
+    """Return the counters of ``board``, read directly and not over a line, at each call."""
     board.receive(encode(PacketType.GET_STATS, 0, GetStats(0).payload(next(_REQUESTS))))
     (stats,) = (
         parse(packet.type, packet.payload) for packet in Decoder().feed(board.take_output())
@@ -136,7 +136,7 @@ def same(data: bytes) -> bytes:
 
 
 def board_info(**changes: object) -> BoardInfo:
-    """What a board might say."""
+    """Return the properties of a board, some of them changed."""
     values: dict[str, object] = {
         "request": 1, "firmware": (0, 1, 0), "board": "nucleo_f767zi",
         "serial": "0123456789ABCDEF01234567",
@@ -161,5 +161,5 @@ def of(kind: type[Kind], items: Iterable[object]) -> list[Kind]:
 
 
 def raw_frames(device: Device, frames: int = 0) -> list[RawFrame]:
-    """What a stream of raw frames gives, without events."""
+    """Return the raw frames of a stream, without events."""
     return of(RawFrame, device.stream(Stream.RAW, frames=frames))

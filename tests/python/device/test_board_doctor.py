@@ -22,7 +22,7 @@ from small_models import prebuilt, session
 
 
 def info(**changes: object) -> BoardInfo:
-    """Of a board with the prebuilt model."""
+    """Return the properties of a board with the prebuilt model."""
     model, blob = prebuilt()
     own = {"model_bytes": len(blob), "model_crc": zlib.crc32(blob)}
     return board_info(**own | {"protocol_hash": model.protocol.hash, "drive": 1} | changes)

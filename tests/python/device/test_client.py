@@ -131,7 +131,7 @@ def test_a_restart_loses_the_reference_and_says_so():
 
 
 class Scripted(Transport):
-    """A port that says what it is told to; ``answers`` turns what is written into what is read."""
+    """A port with scripted answers: ``answers`` returns the bytes to read for the bytes written."""
 
     url = name = "serial:/dev/scripted"
     capabilities = Capabilities(own_clock=True, baud=115200)

@@ -39,7 +39,7 @@ def volts() -> np.ndarray:
 
 
 def shown(folder: Path, cells: list[list[str]], channels: str = "") -> tuple[list, int]:
-    """What a stream of touches and raw frames of these lines gives after a tare."""
+    """Return the items of a stream of touches and raw frames of these lines, after a tare."""
     (folder / "layout.toml").write_text(LAYOUT + channels)
     (folder / "lines.csv").write_text("\n".join(",".join(line) for line in cells) + "\n")
     with open_device(f"text:{folder}/lines.csv?layout={folder}/layout.toml") as device:

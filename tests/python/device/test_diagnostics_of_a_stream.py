@@ -1,5 +1,5 @@
-"""What is found wrong with frames is named in their heads, as faults, and once in lines; on a
-simulated board, recorded too."""
+"""Diagnostics of a stream are named in the heads of frames, as faults, and once in lines: on a
+simulated board, and in a recording of it."""
 
 import zlib
 from collections.abc import Iterable

@@ -29,7 +29,7 @@ def frames_of(url: str, mode: Stream, record: Path | None = None, **more: object
 
 
 def reported(frames: list[Frame]) -> list[str]:
-    """What is worth a line."""
+    """Return the names of the events that are gestures."""
     return [event.name for frame in frames for event in frame.events if event.is_gesture]
 
 

@@ -61,7 +61,7 @@ CASES: dict[str, tuple[list[Event], list[int | None], dict[str, int]]] = {
     "a loss right after a restart is a gap": (
         [*TOLD, *new([4], 9000)], [0] * 11 + [3], {"restarts": 1, "gaps": 1, "missing": 3}
     ),
-    # the line gives the board's first INFO twice, and more after it; at first it cannot be told
+    # the line repeats the board's first INFO, and more follows; at first this may be a restart
     "the first INFO may be repeated": (
         [(0, 7, True), *new(range(1, 6), 10), (0, 7, True), *new((1, 2, 6, 7, 8), 10)],
         [0] * 7 + [None, None, 0, 0, 0], {"duplicates": 3},

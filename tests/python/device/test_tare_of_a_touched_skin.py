@@ -27,7 +27,7 @@ def touched() -> Iterator[Device]:
 
 
 def places(device: Device) -> list[tuple[float, float]]:
-    """Of the touches of the next frame but one."""
+    """Return the places of the touches in the second of the next two frames."""
     frames = [one for one in device.stream(frames=2) if isinstance(one, SolvedTouches)]
     return [(touch.x_mm, touch.y_mm) for touch in frames[-1].touches]
 

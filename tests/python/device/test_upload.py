@@ -201,7 +201,7 @@ def test_a_model_that_a_simulated_board_cannot_use_is_named(kind, blob, said, tm
 
 @cache
 def fine_blob(storage: str, rank: int = 8) -> bytes:
-    """Of more pixels than a packet's image has."""
+    """Return a model with more pixels than the image of a packet can have."""
     s = small()
     linear = linearise(s.skin, s.protocol, pixels_across=76, elements=900)
     settings = BuildSettings(rank=rank, storage=storage)

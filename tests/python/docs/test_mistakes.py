@@ -62,7 +62,7 @@ def rows() -> list[tuple[str, str, str]]:
 
 @contextlib.contextmanager
 def in_a_folder_of_files() -> Iterator[None]:
-    """Where there are frames, files with mistakes in them, and no serial port."""
+    """Enter a folder with frames and with files that contain mistakes, without a serial port."""
     before = Path.cwd()
     with tempfile.TemporaryDirectory() as name:
         os.chdir(name)

@@ -1,5 +1,5 @@
-"""What must be true of a firmware image on the emulated board, one check a property: each returns
-what is wrong, or None.
+"""Checks of a firmware image on the emulated board. Each checks one property, and returns what is
+wrong, or None.
 
 The session is short, and bounded in the board's own time: a broken image must fail soon and not
 hang the test.

@@ -19,7 +19,8 @@ A2_LOW = [k & ~4 for k in range(16)]
 
 @dataclass(frozen=True)
 class Mistake:
-    """What the maker did to the emulated ``board``; which stage names it, in words."""
+    """A mistake of the maker of a board, which ``make`` puts into the emulated one, and the stage
+    that must name it."""
 
     name: str
     make: Callable

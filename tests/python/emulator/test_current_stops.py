@@ -1,5 +1,5 @@
-"""What stops the current behind the program's back: loss of the clock or of the supply, a processor
-that hangs, a current that is not the source's; and that the monitor sees what must never be."""
+"""Events that stop the current without the program: loss of the clock or of the supply, a processor
+that hangs, a current that is not the source's. The monitor must notice forbidden states."""
 
 import pytest
 

@@ -49,7 +49,7 @@ def test_the_generator_runs_at_50_khz(untouched):
 
 
 def test_the_image_passes_every_check(image):
-    """Of those that notice a mutant in test_mutations.py."""
+    """The checks are those that must notice the mutants in test_mutations.py."""
     session = run_session(image)
     assert {check.__name__: reported for check in CHECKS if (reported := check(session))} == {}
 

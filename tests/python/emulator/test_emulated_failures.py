@@ -1,5 +1,5 @@
-"""What the firmware does when things go wrong: uploads cut at any byte, a program that crashes or
-hangs, noise on the line."""
+"""Behaviour of the firmware in failures: uploads that are cut at any byte, a program that crashes
+or hangs, noise on the line."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ LOAD_NOWHERE = bytes.fromhex("4ff0c0400068fee7")  # mov.w r0, #0x60000000; ldr r
 
 
 def faults_of(device: Device) -> list[Fault]:
-    """What the board reports its own accord now."""
+    """Return the faults that the board reports now without being asked."""
     reported = []
     while (item := device.next_item(0.1)) is not None:
         if isinstance(item, Fault):

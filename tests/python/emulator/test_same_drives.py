@@ -44,7 +44,7 @@ snr_db = 60.0
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a board sent of its tare and from the first followed drive on."""
+    """Packets that a board sent during its tare, and from the first followed drive on."""
 
     untouched: list[RawFrame]
     raw: list[RawFrame]
@@ -85,9 +85,9 @@ class Recorded:
 
 
 class Given:
-    """In place of what an emulated board demodulates: the frames of a tare, of which the current
-    settles in the first scan; then the first of the others, until touches are followed from it on.
-    """
+    """Frames that replace those that an emulated board demodulates. First come the frames of a
+    tare; in its first scan the current settles. Then the first of the other frames is repeated
+    until touches are followed, and after that come the rest."""
 
     def __init__(self, board: Any, elf: Path, given: Recorded) -> None:
         self._engine, self._raw = board.cpu.engine, given.raw

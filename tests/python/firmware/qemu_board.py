@@ -15,7 +15,7 @@ from eitskin.device.wire.payloads import parse
 
 @dataclass
 class Script:
-    """What the host sends, and when on the board's clock (us)."""
+    """Packets that the host sends, each with its time on the board's clock (us)."""
 
     records: list[tuple[int, bytes]] = field(default_factory=list)
 

@@ -1,5 +1,5 @@
-"""What the built images hold: vectors, places in memory, sizes, and nothing of a heap, of stdio or
-of double arithmetic."""
+"""Contents of the built images: vectors, places in memory and sizes; and no heap, stdio or double
+arithmetic."""
 
 import re
 import shutil
@@ -88,7 +88,7 @@ def test_places_in_memory(sections, symbols):
     # DMA works on memory that no cache covers.
     for name in ("buffers", "tx_ring", "rx_ring"):
         assert DTCM <= symbols[name] < DTCM + DTCM_BYTES, name
-    # What survives a reset is neither cleared nor painted.
+    # Memory that survives a reset is neither cleared nor painted.
     assert symbols["dtcm_start"] >= symbols["crash"] + 28
     assert symbols["crash"] >= symbols["stack_top"]
     assert symbols["workspace_start"] % 16 == 0 and symbols["workspace_start"] >= symbols["bss_end"]

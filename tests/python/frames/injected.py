@@ -87,7 +87,7 @@ def times(frames: Frames, gains: FloatArray) -> Frames:
 def as_if_electrodes(
     frames: Frames, electrodes: NDArray[np.int64], skin: Skin | None = None, seed: int = 0
 ) -> Frames:
-    """What is measured when the wire labelled e goes to electrode ``electrodes[e]`` of the skin."""
+    """Return the frames that are measured if wire e is connected to electrode ``electrodes[e]``."""
     skin = paper_skin() if skin is None else skin
     rows = frames.protocol.drive_measure.astype(np.int64)
     moved = Protocol(frames.protocol.n_electrodes, electrodes[rows], frames.protocol.current_a)

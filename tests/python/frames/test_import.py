@@ -41,8 +41,7 @@ def source(
 def taken(
     path: Path, protocol: Any = ADJACENT, skin: Any = None, source: Any = KEYS, **options: Any
 ) -> Frames:
-    """What import makes of ``path``; the source's arrays are v and r unless something else is
-    said."""
+    """Import ``path``. The source's arrays are v and r, unless ``source`` names others."""
     return import_frames(path, ImportOptions(source=source, **options), protocol, skin)
 
 

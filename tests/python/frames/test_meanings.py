@@ -1,4 +1,4 @@
-"""What a number means: an offset, potentials against ground, differences, a first line that counts.
+"""Meanings of numbers: an offset, potentials against ground, differences, a first line that counts.
 The doctor finds each before it advises teaching, and the command that it prints repairs it."""
 
 import shlex

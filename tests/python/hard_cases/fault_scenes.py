@@ -123,7 +123,7 @@ def scorer() -> Scorer:
 
 
 def miou(image: np.ndarray, k: int) -> float:
-    """Of an image (n,) against scene k, at the model's own threshold."""
+    """Return the MIoU of an image (n,) with scene k, at the model's own threshold."""
     image_scorer, scene = scorer().image_scorer, scenes()[k]
     truth = metrics.disc_mask(image_scorer.raster.points_mm, scene.centres_mm(), scene.radii_mm())
     shown = image_scorer.lookup.show(np.asarray(image, dtype=np.float64))

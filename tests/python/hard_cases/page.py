@@ -89,7 +89,7 @@ def peers() -> dict[str, dict[str, str]]:
 
 
 def _in_a_word(cell: str) -> str:
-    """What a cell says, without the exception's name and the MIoU of clean frames."""
+    """Return the text of a cell without the exception's name and the MIoU of clean frames."""
     return cell.split(":")[0].split(" (clean")[0].replace(", MIoU", ",")
 
 

@@ -1,5 +1,5 @@
-"""What float32 costs, as curves: over the condition number of S, and over how small the change is
-beside the voltages that it is a difference of."""
+"""Curves of the errors of float32: over the condition number of S, and over the size of the change
+relative to the voltages of which it is the difference."""
 
 from dataclasses import dataclass, replace
 
@@ -58,7 +58,7 @@ def condition_steps() -> list[Step]:
 
 
 def by_condition(narrow: list[Outcome]) -> list[Condition]:
-    """Of the float32 outcomes of ``condition_steps``."""
+    """Compare the float32 outcomes of ``condition_steps`` with float64, by condition number."""
     steps = condition_steps()
     wide, found = on_host(steps, "float64")[1], []
     for k, condition in enumerate(CONDITIONS):

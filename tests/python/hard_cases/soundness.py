@@ -61,23 +61,23 @@ class Judged:
 
     @property
     def rho(self) -> float:
-        """How far off the residual may be, in norm."""
+        """Largest error of the residual by rounding, in norm."""
         sizes = np.linalg.norm(self.s, axis=0)
         reach = np.linalg.norm(self.y) + float(np.abs(self.x) @ sizes)
         return (np.count_nonzero(self.x) + 2) * U * float(reach)
 
     @property
     def objective_rounding(self) -> float:
-        """How far off the objective may be: |r| rho for the residual, and (r + n) u of the sums of
-        squares and magnitudes."""
+        """Largest error of the objective by rounding: |r| rho for the residual, and (r + n) u for
+        the sums of squares and magnitudes."""
         r, (rank, n) = float(np.linalg.norm(self.residual)), self.s.shape
         return r * self.rho + 0.5 * self.rho**2 + (rank + n + 4) * U * self.objective
 
     @property
     def gap_rounding(self) -> float:
-        """How far off the gap may be: as the objective, and by the correlations' error dc: sum_j
-        |x_j| dc_j for the slacks, and, as s = lambda / max c is off by at most dc / max c, that
-        share of |r|^2 + sum_j |x_j c_j|.
+        """Largest error of the gap by rounding: that of the objective, and two parts from the error
+        dc of the correlations. The slacks contribute sum_j |x_j| dc_j. The relative error of s =
+        lambda / max c is at most dc / max c, and contributes this share of |r|^2 + sum_j |x_j c_j|.
         """
         r = self.residual
         correlation, norm = self.s.T @ r, float(np.linalg.norm(r))

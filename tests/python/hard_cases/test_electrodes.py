@@ -14,8 +14,8 @@ from margins import Margins
 def compare(
     same_everywhere: SameEverywhere, spoil: Callable[[int, np.ndarray], np.ndarray]
 ) -> list[tuple[Outcome, Outcome]]:
-    """Of each scene, the outcome of the touched frame, and of that with ``spoil`` applied; both
-    with the same noise."""
+    """Return for each scene the outcomes of the touched frame and of the frame that ``spoil`` made
+    of it, both with the same noise."""
     both = played(lambda k: [touched(k), noisy(k, spoil(k, simulated()[k]["touched"]), 1)])
     return [(clean, spoilt) for clean, spoilt in run(same_everywhere, both, options())]
 

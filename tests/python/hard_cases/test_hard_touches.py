@@ -194,8 +194,8 @@ def test_insulating(same_everywhere, margins, sign):
 
 
 def test_insulating_under_the_other_sign(same_everywhere, margins):
-    """Where only increases are looked for, an insulating touch shows as increases around it: no
-    coefficient has the other sign, and where touches are found that are none, it is said."""
+    """If only increases are looked for, an insulating touch looks like increases around it. No
+    coefficient may have the other sign, and false touches must come with a diagnostic."""
     for one in reconstruct(same_everywhere, frames_of("insulating")):
         margins.everywhere(
             "physics/insulating",
@@ -236,7 +236,8 @@ def test_light_presses(same_everywhere, margins):
 
 
 def says_that_there_are_too_many(one: Outcome) -> bool:
-    """Whether the core says that touches cannot be told apart, or that the frame is no touch's."""
+    """Whether the core reports that touches cannot be separated, or that no touch explains the
+    frame."""
     return bool({"crowded", "stale reference"} & set(one.info.diagnostics_by_name))
 
 

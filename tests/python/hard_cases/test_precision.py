@@ -13,7 +13,7 @@ from small_models import prebuilt
 
 @pytest.mark.parametrize("same_everywhere", ["float32"], indirect=True)
 def test_error_over_the_condition_number(same_everywhere, margins):
-    """What the data say is as exact at any condition; coefficients lose with it."""
+    """S x is equally exact at any condition number; coefficients lose digits as it grows."""
     _, outcomes = same_everywhere.steps(condition_steps())
     for condition, found in zip(CONDITIONS, by_condition(outcomes), strict=True):
         what = f"S x, float32 from float64, condition {condition:.0e}"

@@ -40,7 +40,7 @@ def matrices(draw: st.DrawFn) -> np.ndarray:
 
 @st.composite
 def problems(draw: st.DrawFn) -> dict[str, Any]:
-    """What a solve is asked."""
+    """Draw a problem for a solve."""
     s = draw(matrices())
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     kind = draw(st.sampled_from(["random", "of a column", "sparse", "zero"]))

@@ -1,5 +1,5 @@
-"""What moves between the reference and the frame: gain, skin, common mode; and a reference that was
-none."""
+"""Changes between the reference and the frame: gain, skin, common mode; and a reference that was
+taken under a touch."""
 
 import numpy as np
 from fault_scenes import COUNT, frames_of, miou, noisy, played, rms_v, simulated, touched

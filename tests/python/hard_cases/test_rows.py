@@ -39,7 +39,7 @@ def run(
 def in_scene_0(
     same_everywhere: SameEverywhere, frames: list[np.ndarray] | np.ndarray, **changes: object
 ) -> list[Outcome]:
-    """Of frames after a tare on its untouched frames."""
+    """Return the outcomes of frames after a tare on the untouched frames of scene 0."""
     (found,) = run(same_everywhere, [(quiet_frames(0), np.array(frames))], options(**changes))
     return found
 
@@ -75,8 +75,8 @@ def test_outlier(same_everywhere, margins):
 
 
 def test_outlier_in_half_scans(same_everywhere, margins):
-    """Without reciprocals only what the other rows contradict can be told: the mean loss is at most
-    half of what it would be."""
+    """Without reciprocals the core finds only outliers that the other rows contradict: the mean
+    loss is at most half of the loss without this check."""
     found, blind = [], []
     scans = [
         (half(untouched), half(frames))

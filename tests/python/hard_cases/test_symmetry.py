@@ -173,18 +173,18 @@ def test_channels_permuted_with_the_protocol(same_everywhere, margins):
 
 
 def quarter_turn(grid: Grid) -> np.ndarray:
-    """Which pixel each goes to when the disk is turned by 90 degrees, counterclockwise."""
+    """Return where each pixel goes if the disk is turned by 90 degrees, counterclockwise."""
     ix, iy = grid.index[:, 0], grid.index[:, 1]
     return np.asarray(grid.number[ix, grid.nx - 1 - iy])
 
 
 def mirrored(grid: Grid) -> np.ndarray:
-    """Which pixel each goes to when the disk is mirrored at the y axis."""
+    """Return where each pixel goes if the disk is mirrored at the y axis."""
     return np.asarray(grid.number[grid.index[:, 1], grid.nx - 1 - grid.index[:, 0]])
 
 
 def rows_moved(protocol: Protocol, electrode: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where each row of the table goes, and its sign, when electrode e becomes ``electrode[e]``."""
+    """Return the new place and the sign of each row if electrode e becomes ``electrode[e]``."""
     place = {tuple(row): k for k, row in enumerate(protocol.drive_measure.tolist())}
     to, sign = [], []
     for a, b, c, d in electrode[protocol.drive_measure.astype(int)].tolist():

@@ -37,7 +37,7 @@ def at(
 
 
 def crowds() -> dict[str, tuple[TrueTouch, ...]]:
-    """More touches than can be told apart: many, and close ones."""
+    """More touches than can be separated: many, and close ones."""
     return {
         "10 on a ring": ring(10, 70.0, 9.0),
         "14 on two rings": (*ring(9, 78.0, 7.0), *ring(5, 38.0, 7.0, 0.3)),

@@ -47,8 +47,8 @@ def test_both_refuse_every_damaged_byte(flip):
 
 @pytest.mark.parametrize("field", range(10))
 def test_whole_numbers_of_dims(field):
-    """What else fits the sections' sizes: larger images, more electrodes, ranks of the same stride,
-    another data kind."""
+    """Other values that fit the sizes of the sections: larger images, more electrodes, ranks of the
+    same stride, another data kind."""
     blob = tiny_blob()
     place = sections_of(blob)["DIMS"].offset + 4 * field
     own = struct.unpack_from("<I", blob, place)[0]

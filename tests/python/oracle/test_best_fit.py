@@ -16,9 +16,9 @@ from eitskin.skin.skin import paper_skin
 from eitskin.solve.reconstructor import Reconstructor
 from small_models import prebuilt
 
-# By how much the cost of the C core's touches exceeds the best one, relative to it: at the core's
-# places with the best radii and contrasts, and with its own radii and strengths. Median and worst
-# of the scenes. Measured 1 and 2 %, and 3 and 11 %.
+# Bounds of the relative excess of the C core's cost over the best one: at the core's places with
+# the best radii and contrasts, and with its own radii and strengths. Median and worst of the
+# scenes. Measured: 1 and 2 %, and 3 and 11 %.
 PLACES_MEDIAN, PLACES_WORST = 0.03, 0.06
 WHOLE_MEDIAN, WHOLE_WORST = 0.08, 0.2
 

@@ -32,7 +32,7 @@ Spoil = Callable[[FloatArray], object]
 
 
 def said(engine: object, frame: FloatArray) -> tuple[object, ...]:
-    """What is named in ``frame``, or why it is refused."""
+    """Return the diagnostics of ``frame``, or the reason why it is rejected."""
     try:
         info: Info = engine.reconstruct(frame, touches=False).info  # type: ignore[attr-defined]
     except FrameError as error:
@@ -49,7 +49,7 @@ def tared(untouched: int = 64, **options: object) -> AllEngines:
 
 
 def alike(made: AllEngines, frame: FloatArray) -> tuple[object, ...]:
-    """What all engines say of it."""
+    """Return what all engines report for the frame; they must agree."""
     narrow = frame.astype(np.float32).astype(float)
     found = {name: said(one, narrow) for name, one in made.items()}
     assert found["c"] == found["c64"] == found["numpy"]

@@ -1,4 +1,4 @@
-"""What touches do to each other: the formula against the exact model."""
+"""The interaction of touches: the formula compared with the exact model."""
 
 from dataclasses import replace
 

@@ -18,7 +18,7 @@ WIDTHS = {"float64": 1e-9, "float32": 1e-4}  # rounding of a gap, relative to th
 
 
 def problem(seed: int, sign: str, share: float, *, drift: bool = True) -> Lasso:
-    """Of one small frame, lambda being ``share`` of lambda_max."""
+    """Return the problem of one small frame, with lambda = ``share`` of lambda_max."""
     oracle = OracleEngine(small_model())
     oracle.set_options(replace(default_options(small_model()), sign=sign, project_reference=drift))
     oracle.set_reference(small().linear.v0_v[None])
@@ -82,7 +82,7 @@ def test_the_gap_bounds_what_is_lacking_and_fista_closes_it(sign):
 
 
 def test_violations_are_found():
-    """Of each of the three conditions, by a point that violates it alone."""
+    """Each of the three conditions is violated alone by one point, and this is found."""
     p = problem(2, "increase", 0.1)
     best = p.optimum()
     on = int(np.argmax(best))
@@ -104,7 +104,8 @@ def test_lambda_max_is_the_least_lambda_whose_optimum_is_zero():
 
 
 def solved(width: str, sign: str, **options: object) -> tuple[Lasso, Reconstruction]:
-    """What the core makes of a small frame, and the oracle's problem of its lambda."""
+    """Return the oracle's problem with the core's lambda, and the core's result for a small
+    frame."""
     own = {"detection_factor": 0.0, "iterations": 100_000, "lambda_rel": 0.03, "sign": sign}
     chosen: Options = replace(default_options(small_model()), **(own | options))
     frame = small().frames(5, 1, sign)[0].astype(np.float32).astype(float)

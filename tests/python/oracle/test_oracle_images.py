@@ -40,9 +40,10 @@ from small_models import (
 
 FRAMES = 10
 DATA = {"iterations": 1, "lambda_abs": 1e-30, "sign": "both"}
-# Of S'y relative to its greatest, of images to their peaks. U as stored is orthogonal to float32's
-# rounding only: C sums over the rows left out or in use, whichever are fewer, and the oracle over
-# those in use. The images' bounds are for 60 iterations, which raise what differs.
+# Bounds of the errors: of S'y relative to its greatest value, and of images relative to their
+# peaks. The stored U is orthogonal only within float32's rounding, and the two programs sum
+# differently: C sums over the rows left out or over those in use, whichever are fewer, and the
+# oracle over those in use. The bounds of images are for 60 iterations, which enlarge differences.
 EXACT = {"c64": (1e-12, 1e-11), "c": (4e-6, 2e-4)}
 STORED = {"c64": (4e-6, 4e-5), "c": (4e-6, 5e-4)}  # of a raised regularisation
 WHITENED = {"c64": (5e-5, 5e-3), "c": (1e-4, 1e-2)}

@@ -1,5 +1,5 @@
-"""Who imports whom: no circle of modules, each package only those that its data come from, and
-nothing of what only a checkout has in what is installed."""
+"""Rules of imports: modules form no circle, each package imports only those from which its data
+come, and the installed packages import nothing that only a checkout has."""
 
 import ast
 from collections.abc import Iterable
@@ -131,7 +131,7 @@ def test_the_installed_package_imports_one_thing_that_only_a_checkout_has():
 
 
 def packages_imported(folder: Path) -> dict[str, set[str]]:
-    """Of each file in ``folder``, the packages and single modules that it imports."""
+    """Return for each file in ``folder`` the packages and single modules that it imports."""
     found = {}
     for path in folder.rglob("*.py"):
         names = set()

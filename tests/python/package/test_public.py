@@ -1,4 +1,4 @@
-"""What ``import eitskin`` gives: listed, light, typed, and enough for a program."""
+"""The names that ``import eitskin`` gives are listed, light, typed, and enough for a program."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What pip installs: the product, and nothing of the studies. The list is that of the wheel."""
+"""pip installs the product and nothing of the studies. The list is that of the wheel."""
 
 import io
 import zipfile

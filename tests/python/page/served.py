@@ -24,7 +24,7 @@ ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 
 def until(what: Callable[[], Any], seconds: float = 60.0) -> Any:
-    """What ``what`` gives once it is true."""
+    """Wait until ``what`` returns something true, and return it."""
     end = time.monotonic() + seconds
     while not (value := what()):
         assert time.monotonic() < end, "it never came"
@@ -52,7 +52,7 @@ def serving(url: str, mode: Stream = ALL, **more: Any) -> Iterator[PageServer]:
 
 
 class Page:
-    """What a user sees and does."""
+    """The live page in a browser, with what a user sees and does."""
 
     def __init__(self, folder: Path) -> None:
         options = webdriver.ChromeOptions()
@@ -77,7 +77,7 @@ class Page:
         return self.run(f"return document.getElementById('{name}').{what}")
 
     def text(self, name: str) -> str:
-        """What an element says."""
+        """Return the text of an element."""
         return str(self.get(name))
 
     def shown(self, name: str) -> bool:
@@ -104,7 +104,7 @@ class Page:
         )
 
     def answer(self) -> str:
-        """What came of the last press."""
+        """Return the answer to the last press of a button."""
         return str(until(lambda: self.text("answer").replace("…", ""), 120))
 
     def touches(self) -> list[tuple[float, float]]:
@@ -116,7 +116,7 @@ class Page:
         return sorted((float(row[1]), float(row[2])) for row in rows)
 
     def size(self, width: int, height: int, *, dark: bool = False) -> None:
-        """Of the window, and what the system prefers."""
+        """Set the size of the window, and the dark or light preference of the system."""
         self.command(
             "Emulation.setDeviceMetricsOverride",
             width=width,

@@ -1,5 +1,5 @@
-"""What a hostile page, another program on the port, or a full disk does to the live page: nothing
-that others notice."""
+"""A hostile page, another program on the port, or a full disk changes nothing that other users of
+the live page notice."""
 
 import json
 import socket

@@ -375,7 +375,7 @@ def test_a_phone_shows_the_skin_below_its_toolbar(live):
 
 
 def place_on_screen(page: Page, x_mm: float, y_mm: float) -> tuple[float, float]:
-    """Where the skin's canvas shows a place, in CSS pixels from the window's corner."""
+    """Return where the skin's canvas shows a place, in CSS pixels from the window's corner."""
     box = page.box("skin")
     scale = min(box["width"] - 52, box["height"] - 52) / 194
     middle = box["left"] + box["width"] / 2, box["top"] + box["height"] / 2

@@ -79,7 +79,7 @@ def round_skin(server, page) -> Page:
 
 
 def pixels(page: Page) -> np.ndarray:
-    """What WebGL has drawn, (rows, columns, 3)."""
+    """Return the image that WebGL has drawn, (rows, columns, 3)."""
     url = str(page.get("surface", "toDataURL()"))
     image = PIL.Image.open(io.BytesIO(base64.b64decode(url.split(",")[1])))
     return np.asarray(image.convert("RGB")).astype(int)

@@ -1,4 +1,4 @@
-"""Who may look on and who may command, what a slow page costs the others, and what is refused."""
+"""Rights to watch and to command, the effect of a slow page on others, and refused requests."""
 
 import asyncio
 import json

@@ -241,7 +241,7 @@ def several(folder: Path, scene: str, count: int) -> Path:
 
 
 def test_skins_wait_for_a_slow_reader(tmp_path):
-    """No more than ROOM messages of each wait, and none is lost."""
+    """At most ROOM messages of each skin wait, and none is lost."""
     with open_session(f"{several(tmp_path, 'two_touch', 5)}?loop=1", SessionSettings()) as session:
         assert isinstance(session, RobotSession)
         numbers: dict[str | None, list[int]] = {}

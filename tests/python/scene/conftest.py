@@ -1,4 +1,4 @@
-"""What the tests of scenes share: a cache of meshes once a module."""
+"""Fixtures for the tests of scenes: one cache of meshes per module."""
 
 import pytest
 

@@ -1,5 +1,5 @@
-"""What the tests of scenes share: small scenes, effects made on the spot, and the command line of
-scenes alone."""
+"""Helpers for the tests of scenes: small scenes, effects that a test makes, and the command line
+with the commands for scenes only."""
 
 import argparse
 import sys

@@ -44,7 +44,7 @@ def scene_of(track: TouchTrack, **changes: object) -> Scene:
 
 
 def test_each_row_of_a_sudden_press_has_its_own_instant(mesh_cache):
-    """Of a touch that is there from row 60 of frame 1 to row 20 of frame 3."""
+    """The touch is on the skin from row 60 of frame 1 to row 20 of frame 3."""
     row_s = 1e-4
     scene = scene_of(press((208 + 59.5) * row_s, 0, (3 * 208 + 20.5) * row_s))
     v = simulate_frames(compile_scene(scene, mesh_cache=mesh_cache)).voltage_v[2:]

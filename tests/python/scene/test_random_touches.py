@@ -58,7 +58,7 @@ def test_seeds_and_roles_are_independent():
 
 
 def test_places_are_uniform_over_the_skin():
-    """Of single small touches half lie within radius R / sqrt(2), by area."""
+    """Half of the single small touches lie within radius R / sqrt(2), which is half of the area."""
     rules = TouchRules(count=(1, 1), radius_mm=(1.0, 1.0), rim_margin_mm=0.0)
     xy = np.concatenate([s.centres_mm() for s in random_touches(PAPER, 0, 600, rules=rules).scenes])
     inside = np.count_nonzero(np.hypot(*xy.T) < 96 / np.sqrt(2)) / 600

@@ -1,4 +1,4 @@
-"""What frames show in words: lines, JSON, and the error to the scene's truth."""
+"""Frames as text: lines, JSON, and the distance to the scene's truth."""
 
 import json
 from dataclasses import replace

@@ -23,7 +23,7 @@ FRAMES_OF_DRIVES = 8
 
 @dataclass(frozen=True)
 class Swipe:
-    """What was seen, and on which skin."""
+    """The messages of a swipe, and the skin that they are of."""
 
     items: list[Frame | DriveReport]
     source: TouchSource

@@ -1,4 +1,4 @@
-"""Which skin a message is of: the source's name in every message and sink."""
+"""The name of the skin is in every message and sink."""
 
 import json
 import socket

@@ -192,7 +192,7 @@ def test_one_writes_to_a_file(swipe, kind, tmp_path):
 
 @pytest.mark.parametrize("kind", ["csv", "mcap"])
 def test_a_full_disk_is_said(swipe, kind):
-    """Where the file is opened, or by its counts."""
+    """A full disk is reported when the file is opened, or later by the counts."""
     source, said = replace(swipe.source, overwrite=True), list[str]()
     try:
         with Outputs([f"{kind}:/dev/full"], source, say=said.append) as outputs:

@@ -57,7 +57,7 @@ def with_reports(swipe: Swipe, drives: Swipe) -> Swipe:
 
 
 def check(messages: list[dict[str, Any]], swipe: Swipe) -> None:
-    """They are valid and tell of the swipe, whole and in order."""
+    """Check that the messages are valid, and contain the whole swipe in order."""
     for message in messages:
         VALID.validate(message)
     frames = [message for message in messages if message["type"] == "frame"]

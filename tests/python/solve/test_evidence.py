@@ -20,13 +20,14 @@ from small_models import prebuilt
 ENGINES = ("c", "c64")  # the oracle has no test of touches
 CENTRE_SURE, PLACE_APART = 0.9, 3.0
 SCENES = 2
-# Of 1120 scenes of the tuning family, float32 and float64 differed by up to .0001 mm in nine of
-# ten, by more than .1 mm in five, in count in none: before the test, data that no discs explain (a
-# drifted skin's) get other discs in float32, up to a dozen, and what is left of them was fitted
-# from elsewhere.
+# In 1120 scenes of the tuning family, places in float32 and float64 differed by up to .0001 mm in
+# nine of ten scenes and by more than .1 mm in five; counts differed in none. The reason: data that
+# no discs explain (those of a drifted skin) get up to a dozen discs before the test, which are
+# other ones in float32, so that the discs that remain were fitted from other starts.
 BOUND_MM, BOUND_REL = 0.2, 0.1
-# What a dozen discs leave of a drifted skin's frame before all of them go: the fit takes some 200
-# moves, and 3e-16 of a voltage decide between 1.013 and 1.018 of the noise, in float64 too.
+# Tolerance for the residual of a drifted skin's frame, to which a dozen discs are fitted before all
+# of them are dropped: the fit takes some 200 moves, and a change of 3e-16 of a voltage decides
+# whether it leaves 1.013 or 1.018 times the noise, in float64, too.
 LAST_BIT = 0.01
 WORLDS = (
     "discs_1_to_3",
@@ -343,8 +344,8 @@ def test_both_widths_agree_with_rows_masked_and_lost():
 @pytest.mark.parametrize("frames", [1, 8])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_noiseless_reference_makes_no_touch_of_a_millionth(engine, frames):
-    """Of a change of each row, at random or smooth, that a noiseless front end would show: some
-    rows are then left out as outliers."""
+    """Each row changes by a millionth, at random or smoothly, which a front end without noise would
+    show. Some rows are then left out as outliers."""
     generator, scenes = np.random.default_rng(3), world("no_touch_noiseless")
     reconstructor = made(engine)
     for untouched_v, drifted_v in zip(scenes.untouched_v, scenes.frames_v, strict=True):

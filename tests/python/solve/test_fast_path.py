@@ -26,7 +26,7 @@ def solved() -> dict[str, States]:
 
 
 class Recorder(Player):
-    """What is reported after each drive and each frame."""
+    """Keeps what is reported after each drive and each frame."""
 
     def tare(self, v0: np.ndarray, sigma: float, rng: np.random.Generator) -> None:
         super().tare(v0, sigma, rng)

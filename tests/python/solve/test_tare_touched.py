@@ -25,7 +25,7 @@ def untouched(count: int, snr_db: float, seed: int) -> FloatArray:
 
 
 def change() -> FloatArray:
-    """Of the model's golden frame, which has touches."""
+    """Return the change that the touches of the model's golden frame cause."""
     golden = prebuilt()[0].golden
     return np.asarray(golden.frame_v, dtype=np.float64) - np.asarray(golden.reference_v)
 

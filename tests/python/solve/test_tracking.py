@@ -61,7 +61,7 @@ def reported(chosen: Options, model: Model | None = None) -> list[tuple[Touch, .
 
 
 def fingers(k: int) -> dict[str, tuple[float, float]]:
-    """Where each finger of ``stream`` is in frame k, by name."""
+    """Return the place of each finger of ``stream`` in frame k, by name."""
     there = {"stays": (-40.0, 10.0)}
     if k < 16:
         there["leaves"] = (-10.0 + 3 * k, -45.0)

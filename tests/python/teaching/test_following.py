@@ -50,7 +50,7 @@ def strength(result: Reconstruction) -> float:
 
 
 def errors_mm(core: Reconstructor) -> np.ndarray:
-    """Of each press in turn, the skin's width for none."""
+    """Return the error of each press in turn; if none is found, it is the width of the skin."""
     tare_v, untouched, pressed, place = drifting()
     core.tare(tare_v)
     found = []

@@ -1,4 +1,4 @@
-"""Which point is chosen for a budget or an accuracy, on made-up points."""
+"""The choice of a point for a budget or an accuracy, on made-up points."""
 
 from dataclasses import replace
 from typing import Any

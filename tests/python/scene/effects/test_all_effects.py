@@ -1,5 +1,5 @@
-"""What every effect must keep: reciprocity where physics does, its own stream, its arguments, its
-documented ranges."""
+"""Rules for every effect: it keeps reciprocity if physics does, draws from its own stream of random
+numbers, leaves its arguments unchanged, and keeps its documented ranges."""
 
 import dataclasses
 import importlib

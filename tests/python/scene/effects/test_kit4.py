@@ -52,7 +52,8 @@ def _correlation(a: FloatArray, b: FloatArray) -> float:
 
 
 def _unexplained(found: FloatArray, by: FloatArray) -> float:
-    """What is left of ``found`` after one factor (the unknown current and conductivity)."""
+    """Return the relative rest of ``found`` that ``by`` does not explain, with one free factor (the
+    unknown current and conductivity)."""
     return float(np.linalg.norm(found - by * (found @ by) / (by @ by)) / np.linalg.norm(found))
 
 
