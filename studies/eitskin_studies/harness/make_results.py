@@ -2,9 +2,10 @@
 
 Each command fills its page and stores the numbers with the commit in ``results/numbers``. A study
 that is stopped goes on where it was, in ``out``. With ``--at-once 2`` two commands run at a time,
-those that take long first; commands that time this computer run by themselves at the end. A command
-that fails does not stop the others. At last the README's numbers are filled from the pages, and the
-page of all results gets the processor time of each command.
+in the order of their names, or with ``--all`` those first that take long; commands that time this
+computer run by themselves at the end. A command that fails does not stop the others. At last the
+README's numbers are filled from the pages, and the page of all results gets the processor time of
+each command.
 
 The folders of measured frames are named in the environment: TANKS (docs/guide/tank.md) and
 PRESSES (results/teaching.md); without them the studies on them are left out, which is printed.
@@ -17,7 +18,7 @@ import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,7 +114,7 @@ def main(words: Sequence[str]) -> int:
     if options.list:
         print("\n".join(f"{name:13} {shlex.join(command)}" for name, command in known.items()))
         return 0
-    chosen = list(known) if options.all else options.names
+    chosen = _longest_first(known) if options.all else options.names
     if not chosen:
         raise UsageError("studies/run: name studies, or use --list or --all")
     for name in chosen:
@@ -138,18 +139,22 @@ def _options(words: Sequence[str]) -> argparse.Namespace:
     return parser.parse_args(words)
 
 
+def _longest_first(known: Iterable[str]) -> list[str]:
+    """By the time that they took; those without one first."""
+    took = _known_times(checkout_root() / RESULTS / "README.md")
+    return sorted(known, key=lambda name: -float(took.get(name, math.inf)))
+
+
 def _run_all(
     chosen: Sequence[str], known: dict[str, list[str]], root: Path, at_once: int
 ) -> list[_Done]:
-    """Run chains of commands, ``at_once`` of them at a time, those first that took long last time
-    or never ran; then those that must be alone."""
-    took = _known_times(root / RESULTS / "README.md")
+    """Run chains of commands in their order, ``at_once`` of them at a time; then those that must be
+    alone."""
     chains = [[name] for name in chosen if name not in ALONE and AFTER.get(name) not in chosen]
     for name, first in AFTER.items():
         chains = [
             [*chain, name] if name in chosen and first in chain else chain for chain in chains
         ]
-    chains.sort(key=lambda chain: -sum(float(took.get(name, math.inf)) for name in chain))
 
     def run_chain(chain: Sequence[str]) -> list[_Done]:
         return [_run(name, known[name], root) for name in chain]
