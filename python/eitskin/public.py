@@ -6,7 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from eitskin.config import nearest
+from eitskin.core.options_table import CHOICES
 from eitskin.device.settings import SolverSettings
 from eitskin.errors import UsageError
 from eitskin.model.model import Model
@@ -52,7 +55,7 @@ def preset(name: str, model: Model | None = None, *, snr_db: float | None = None
 
 
 def stream(
-    url: str = "auto",
+    url: str | Path = "auto",
     *,
     mode: str = "touches",
     model: str | Path | None = None,
@@ -60,7 +63,7 @@ def stream(
     every: int = 0,
     tare: int | None = None,
     preset: str | None = None,
-    to: Sequence[str] = (),
+    to: str | Sequence[str] = (),
     record: str | Path | None = None,
     zones: str | Path | None = None,
     speed: float = 0.0,
@@ -79,8 +82,9 @@ def stream(
         every: every n-th frame; 0: as many as the line carries.
         tare: take the reference from so many frames of the untouched skin.
         preset: "fast", "balanced" or "accurate": scan and solver by name, as ``--preset``.
-        to: sinks, such as "udp://127.0.0.1:9000" (docs/guide/touches-out.md).
-        record: a new recording of every packet; of a robot a folder with one per skin.
+        to: a sink, such as "udp://127.0.0.1:9000" (docs/guide/touches-out.md), or several.
+        record: a new recording of every packet; of a robot a folder with one per skin. An existing
+            file is written over.
         zones: a file of named places, whose presses are reported (docs/guide/gestures.md).
         speed: of what is simulated, emulated or recorded; 1 is as it was, 0 as fast as it can.
         name: of the board, skin or source in every message (None: the URL's, else the
@@ -91,11 +95,34 @@ def stream(
         EitskinError: the board cannot be opened or set up, its stream fails, or a sink cannot be
             opened.
     """
+    if not isinstance(mode, str):
+        raise UsageError(f'stream(mode={mode!r}): must be a text, such as "raw,touches"')
+    _check_paths(url=url, model=model, record=record, zones=zones)
+    _check_numbers(whole=True, frames=frames, every=every)
+    _check_numbers(whole=False, speed=speed)
+    to = [to] if isinstance(to, str) else to
     frames_of = _stream(
-        url, mode, model, frames, every, tare, preset, to, record, zones, speed, name,
+        str(url), mode, model, frames, every, tare, preset, to, record, zones, speed, name,
         solver,
     )  # fmt: skip
     return OneThreadAtATime(frames_of, f"the stream of {url}", "a board has one reader at a time")
+
+
+def _check_paths(url: object, **optional: object) -> None:
+    """Raise a UsageError unless ``url`` is a text or a path, and the others are, too, or None."""
+    for name, value in {"url": url, **optional}.items():
+        if not isinstance(value, str | Path) and (name == "url" or value is not None):
+            raise UsageError(f"stream({name}={value!r}): must be a text or the path of a file")
+
+
+def _check_numbers(*, whole: bool, **named: object) -> None:
+    """Raise a UsageError unless all are numbers from 0 on, and ``whole`` ones where asked for."""
+    kinds = (int, np.integer) if whole else (int, float, np.integer, np.floating)
+    for name, value in named.items():
+        if not isinstance(value, kinds) or not value >= 0:
+            raise UsageError(
+                f"stream({name}={value!r}): must be a {'whole ' * whole}number, 0 or more"
+            )
 
 
 def _stream(
@@ -160,7 +187,7 @@ def _preset(name: str, solver: dict[str, Any]) -> Preset:
 
 def _solver(named: dict[str, Any]) -> SolverSettings:
     try:
-        return SolverSettings(**named)
+        settings = SolverSettings(**named)
     except TypeError:
         solver = SolverSettings.__dataclass_fields__
         unknown = next(name for name in named if name not in solver)
@@ -168,3 +195,8 @@ def _solver(named: dict[str, Any]) -> SolverSettings:
         raise UsageError(
             f"stream({unknown}=...): there is no such argument; {nearest(unknown, (*own, *solver))}"
         ) from None
+    if settings.sign is not None and settings.sign not in CHOICES["sign"]:
+        raise UsageError(
+            f"stream(sign={settings.sign!r}): {nearest(settings.sign, CHOICES['sign'])}"
+        )
+    return settings

@@ -17,6 +17,7 @@ from eitskin.core.diagnostics import with_diagnostics
 from eitskin.core.diagnostics_table import SHOWN, STOPS, InfoFields, Touch
 from eitskin.core.options_table import CHOICES
 from eitskin.core.results import (
+    TAKE_REFERENCE,
     Info,
     LearnedReference,
     Options,
@@ -131,6 +132,8 @@ class CoreEngine:
 
     def _status_text(self, status: int) -> str:
         text = self._ffi.string(self._lib.eits_status_text(status)).decode()
+        if status == self._lib.EITS_E_NO_REFERENCE:
+            return f"{text}; {TAKE_REFERENCE}"
         return f"{text} (C core, status {int(status)})"
 
     @one_at_a_time

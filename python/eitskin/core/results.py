@@ -26,6 +26,8 @@ from eitskin.core.options_table import (
 )
 from eitskin.errors import FrameError, UsageError
 
+TAKE_REFERENCE = "take it from frames of the untouched skin with  tare()"
+
 
 @dataclass(frozen=True)
 class Options(OptionFields):

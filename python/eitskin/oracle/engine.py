@@ -27,6 +27,7 @@ from eitskin.core.diagnostics import with_diagnostics
 from eitskin.core.diagnostics_table import DIAGNOSTICS, Touch
 from eitskin.core.options_table import INTERACTION
 from eitskin.core.results import (
+    TAKE_REFERENCE,
     Info,
     LearnedReference,
     Options,
@@ -184,7 +185,7 @@ class OracleEngine:
         """
         ref = self.reference if ref is None else ref
         if ref is None:
-            raise FrameError("frame: no reference frame has been set")
+            raise FrameError(f"frame: no reference frame has been set; {TAKE_REFERENCE}")
         found, limit, kind = Found(self._wanted), self.options.saturation_v, self.model.data_kind
         masked = self._masked | ~np.isfinite(ref.v0)
         saturated = (np.abs(np.nan_to_num(frame)) >= limit) & (limit > 0) & ~masked

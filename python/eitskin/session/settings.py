@@ -23,7 +23,7 @@ Say: TypeAlias = Callable[[str], None]
 def kinds_of(text: str, name: str) -> Stream:
     """The kinds in "raw,touches"; ``name`` is the option that gave them."""
     what = Stream(0)
-    for kind in text.split(","):
+    for kind in (one.strip() for one in text.split(",")):
         if kind not in KINDS:
             raise UsageError(f"{name} {text}: {nearest(kind, KINDS)}")
         what |= Stream[kind.upper()]

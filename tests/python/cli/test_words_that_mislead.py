@@ -11,7 +11,7 @@ import pytest
 import eitskin
 from eitskin.cli.main import main
 from eitskin.device.open import open_device
-from eitskin.errors import EitskinError, FrameError, UsageError
+from eitskin.errors import ConfigError, EitskinError, FrameError, UsageError
 from eitskin.frames.arrays import pick, read_arrays
 from eitskin.frames.frames import Frames, save_frames
 from eitskin.page.server import listen
@@ -245,3 +245,36 @@ def test_a_port_in_use_is_told_in_words():
         f"cannot listen on 127.0.0.1 port {port} (another program has it, perhaps a second view);"
         " name another with  --port, --port 0  for any that is free"
     )
+
+
+@pytest.mark.parametrize(
+    ("named", "said"),
+    [
+        ({"url": None}, "url=None.: must be a text or the path of a file"),
+        ({"url": ["sim:tap", "sim:swipe"]}, "url=.*must be a text or the path"),
+        (
+            {"model": eitskin.load_model()},
+            "model=<Model paper.*must be a text or the path of a file",
+        ),
+        ({"mode": ["raw", "touches"]}, r'mode=\[.*: must be a text, such as "raw,touches"'),
+        ({"frames": "5"}, "frames='5'.: must be a whole number, 0 or more"),
+        ({"frames": 2.5}, "frames=2.5.: must be a whole number"),
+        ({"frames": -1}, "frames=-1.: must be a whole number, 0 or more"),
+        ({"speed": "fast"}, "speed='fast'.: must be a number, 0 or more"),
+        ({"sign": "up"}, "sign='up'.: known are: both, decrease, increase"),
+    ],
+)
+def test_an_argument_of_the_wrong_kind_is_named(named, said):
+    with pytest.raises(UsageError, match=rf"^stream\({said}"):
+        next(eitskin.stream(**{"url": "sim:two_touch", **named}))
+
+
+def test_one_sink_kinds_with_a_space_and_a_path_are_understood(tmp_path):
+    scene, table = tmp_path / "one finger.toml", tmp_path / "touches.csv"
+    scene.write_text("[scene]\n[[touch]]\nradius_mm = 8.0\nx_mm = 5.0\ny_mm = 0.0\n")
+    with pytest.raises(ConfigError, match=r"a scene, not a robot file.* sim:"):
+        next(eitskin.stream(scene))
+    url, sink = f"sim:{scene}", f"csv:{table}"
+    frames = list(eitskin.stream(url, mode="raw, touches", frames=1, to=sink))
+    assert frames[0].voltage_v is not None and len(frames[0].touches) == 1
+    assert len(table.read_text().splitlines()) == 2
