@@ -44,8 +44,8 @@ def page_copy(folder: Path, name: str) -> Path:
 def goes_on(
     run: Callable[[], ExperimentOutcome], first: ExperimentOutcome, solves: bool = False
 ) -> None:
-    """A second run in the same folder computes and keeps nothing, solves nothing (``solves``: but
-    for its model), and says the same."""
+    """A second run in the same folder computes, keeps and solves nothing, and returns the same
+    results. With ``solves``, it may solve for its model."""
     with pytest.MonkeyPatch.context() as patch:
         for owner, name in ((Store, "put"), (ForwardModel, "solve"))[: 1 if solves else 2]:
             patch.setattr(owner, name, lambda *_, **__: pytest.fail("computed again"))

@@ -49,7 +49,7 @@ def test_run_writes_tables_and_pictures(done, tmp_path):
 
 
 def test_the_recommended_model_is_the_measured_one(done, tmp_path, monkeypatch):
-    """But for its model errors, of 300 random skins."""
+    """The model errors of 300 random skins are left out of the comparison."""
     monkeypatch.setattr("eitskin.model.build.with_model_errors", lambda model, *_, **__: model)
     path = tmp_path / "model.eitm"
     name = json.loads(done(f"recommend --budget 5ms -o {path} --json"))["name"]

@@ -1,5 +1,5 @@
-"""The study on measured tank frames: what it refuses, simulates and judges, and what comes out
-where the frames are."""
+"""The study on measured tank frames: what it refuses, simulates and scores, and its results if the
+measured frames are available."""
 
 from dataclasses import replace
 from pathlib import Path

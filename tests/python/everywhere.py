@@ -42,7 +42,7 @@ class Outcome:
     info: Info
 
     def finite(self) -> bool:
-        """Whether every number that comes out is."""
+        """Whether every number of the outcome is finite."""
         numbers = [getattr(self.info, name) for name in NUMBERS]
         for t in self.touches:
             numbers += [value for value in astuple(t) if value is not None]

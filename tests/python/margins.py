@@ -46,8 +46,8 @@ class Margins:
     def everywhere(
         self, case: str, what: str, measured: float, bound: float, unit: str = ""
     ) -> None:
-        """The same for host f32 and M7, where ``same_everywhere`` has shown that both give the same
-        bits; within ``on``, for its target."""
+        """Record for host f32 and for M7, after ``same_everywhere`` has shown that both give the
+        same bits. Within ``on``, record only for its target."""
         for target in self._everywhere:
             self.record(case, what, target, measured, bound, unit)
 

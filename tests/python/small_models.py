@@ -131,7 +131,8 @@ def small_blob(
     electrodes: int = 16,
     rank: int = 37,
 ) -> bytes:
-    """Its bytes; the rank is no multiple of 8, so that padding is at work."""
+    """Return the bytes of a small model. Its rank is not a multiple of 8, so that rows are
+    padded."""
     s = small(outline, kind, electrodes)
     settings = BuildSettings(rank=rank, storage=storage, data_kind=data_kind)
     return encode_model(make_model(s.skin, s.protocol, s.linear, settings))

@@ -27,8 +27,8 @@ snr_db = 60.0
 
 
 def write_scene(path: Path, frames: int = 6, elements: int = 4000) -> Path:
-    """A scene of ``frames`` frames with one touch at (-40, 10). With 900 elements it is no disc any
-    more, and takes the solver longer."""
+    """Write a scene of ``frames`` frames with one touch at (-40, 10). On a mesh of 900 elements the
+    touch no longer looks like a disc, and the solver takes longer."""
     path.write_text(SCENE.format(frames=frames, elements=elements), encoding="utf-8")
     return path
 

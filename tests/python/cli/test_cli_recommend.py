@@ -19,7 +19,7 @@ def scene(tmp_path) -> Path:
 
 
 def test_the_recommended_model_has_the_points_settings(json_of, tmp_path, monkeypatch):
-    """But for its model errors, of 300 random skins."""
+    """The model errors of 300 random skins are left out of the comparison."""
     monkeypatch.setattr("eitskin.model.build.with_model_errors", lambda model, *_, **__: model)
     path = tmp_path / "model.eitm"
     facts = json_of(f"recommend --budget 5ms -o {path}")

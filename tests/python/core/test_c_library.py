@@ -56,8 +56,9 @@ def asked_of_others(library: Path) -> set[str]:
 
 
 def writable(library: Path) -> set[str]:
-    """Variables that can be written after start, and sections that hold such bytes. Tables of
-    constant pointers are none: those are relocated once (.data.rel.ro)."""
+    """Return the variables that can be written after the start, and the sections that contain such
+    bytes. Tables of constant pointers (.data.rel.ro) do not count, because they are only relocated
+    once."""
     of_section = {
         f"section {name}"
         for name, size in re.findall(

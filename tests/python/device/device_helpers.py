@@ -29,8 +29,9 @@ FRAMES = 10
 
 @cache
 def scene(elements: int = 2500) -> Scene:
-    """One touch at (-40, 10) on the paper's skin, with noise at 60 dB; ten frames. On so coarse a
-    mesh it is no disc, and some frames show two touches; 5,000 elements show one."""
+    """Ten frames of one touch at (-40, 10) on the paper's skin, with noise at 60 dB. On a mesh as
+    coarse as the default one the touch does not look like a disc, and some frames show two touches;
+    with 5,000 elements they show one."""
     touch = TouchTrack((Keyframe(-1e9, -40.0, 10.0, 9.0, 9.0),), hold=True)
     return Scene(
         "one",

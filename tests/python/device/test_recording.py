@@ -1,5 +1,5 @@
-"""Recordings: what was received is read back, after a kill too; damage is counted; frames come out
-for the other tools."""
+"""Recordings: the received packets are read back, also after a kill; damage is counted; frames can
+be exported for the other tools."""
 
 import json
 import random

@@ -1,5 +1,5 @@
-"""Sequence numbers: gaps are counted, what is no news is refused, a board that begins again is
-recognised."""
+"""Sequence numbers: gaps are counted, old and repeated packets are rejected, and a board that
+restarts is recognised."""
 
 import random
 from collections.abc import Iterable

@@ -88,7 +88,7 @@ def piped(folder: Path, data: bytes) -> Path:
 
 
 def streamed(url: str, *, tare: int = 8) -> tuple[list[object], LinkCounters]:
-    """The raw frames after a tare and what else was reported; what was counted."""
+    """Return the raw frames and other items of a stream after a tare, and the counters."""
     with open_device(url) as device:
         device.tare(tare)
         return list(device.stream(Stream.RAW)), device.counters

@@ -47,11 +47,12 @@ class HardSkin:
     blob: bytes
 
     def untouched_v(self, count: int, noise: float = 1e-3) -> np.ndarray:
-        """(count, m) V with white noise of so much of rms(V0)."""
+        """Return untouched frames (count, m), in V, with white noise of ``noise`` times rms(V0)."""
         return self._noisy(np.tile(self.linear.v0_v, (count, 1)), 1, noise)
 
     def frames_v(self, count: int, noise: float = 1e-3) -> np.ndarray:
-        """(count, m) V of two discs each, anywhere, by the linear answer."""
+        """Return frames (count, m), in V, each with two discs at random places, by the linear
+        answer."""
         rng, centres = np.random.default_rng(2), self.linear.grid.centres_mm()
         size = np.ptp(centres, axis=0).min()
         frames = []

@@ -32,8 +32,9 @@ def lipschitz_of(s: np.ndarray) -> float:
 
 
 def made_model(s: np.ndarray, storage: str = "f32", lipschitz: float | None = None) -> Model:
-    """A model that stores ``s`` (r, n), r up to 20, n up to 64. Its P takes the first r folded
-    rows; the reference is near 1 V. ``lipschitz`` None: that of what is stored."""
+    """Return a model that stores ``s`` (r, n), with r up to 20 and n up to 64. Its P takes the
+    first r folded rows, and its reference is near 1 V. ``lipschitz`` None: that of the stored
+    matrix."""
     rank, columns = s.shape
     fold, stored = PROTOCOL.reciprocal_pairs(), store(s, storage)
     v_ref = 1 + 0.05 * np.cos(np.arange(FOLDED))

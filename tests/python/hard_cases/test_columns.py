@@ -12,8 +12,8 @@ from eitskin.core.options_table import SIGNS, SOLVERS
 
 
 def repeated(times: int, turn: float = 1.0, nudge: float = 0.0) -> RandomProblem:
-    """16 directions, each ``times`` in a row, every second turned by ``turn`` and nudged by so much
-    of itself."""
+    """Return a problem whose directions are repeated in ``times`` neighbouring columns. Every
+    second column is multiplied by ``turn``, and gets noise of ``nudge``."""
     base, rng = gaussian(2, columns=64 // times).s, np.random.default_rng(3)
     s = np.repeat(base, times, axis=1)
     s[:, 1::2] = turn * s[:, 1::2] + nudge * rng.standard_normal(s[:, 1::2].shape)

@@ -42,8 +42,8 @@ def rounding_of_data(h: HardSkin) -> float:
 
 
 def compare_widths(within, name, h, narrow, wide, y, y64) -> None:
-    """The optimum's S x moves by at most as much as y, and as far again by lambda, which follows y;
-    each gap g adds sqrt(2 g)."""
+    """S x of the optimum changes by at most the change of y, and by the same amount again because
+    lambda follows y. Each gap g adds sqrt(2 g)."""
     size, moved = float(np.linalg.norm(y64)), float(np.linalg.norm(y - y64))
     within(f"y, float32 from float64, {name}", moved / size, rounding_of_data(h) / size, "|y|")
     s = h.model.sensitivity

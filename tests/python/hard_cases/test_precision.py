@@ -23,8 +23,8 @@ def test_error_over_the_condition_number(same_everywhere, margins):
 
 @pytest.mark.parametrize("same_everywhere", ["float32"], indirect=True)
 def test_change_down_to_the_last_bit(same_everywhere, margins):
-    """The error of the data is what rounding each voltage costs; where nothing is left of the
-    change, there is no image and no touch; a last bit in every row gives finite numbers."""
+    """The error of the data is that of rounding each voltage. If nothing is left of the change,
+    there is no image and no touch. A change of the last bit in every row gives finite numbers."""
     for size, found in zip(CHANGES, by_change(), strict=True):
         what = f"y, float32 from the change itself, change times {size:.1g}"
         margins.everywhere("problem/cancellation", what, found.data, found.allowed, "|y|")

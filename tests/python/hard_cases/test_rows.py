@@ -53,15 +53,15 @@ def check_loss(
 
 
 def damaged(k: int, amplitude: float) -> np.ndarray:
-    """Scene k with one row off by so much of rms(V0), up or down."""
+    """Return the frame of scene k with one row off by ``amplitude`` times rms(V0), up or down."""
     frame, generator = touched(k), np.random.default_rng([k, round(100 * amplitude)])
     frame[generator.integers(len(frame))] += amplitude * rms_v(k) * generator.choice([-1, 1])
     return frame
 
 
 def test_outlier(same_everywhere, margins):
-    """One row of a full scan off by 5 % of rms(V0) to five times that: left out, counted, and
-    hardly seen."""
+    """One row of a full scan is off by .05 to 5 times rms(V0): it is left out and counted, and the
+    image hardly changes."""
     spoilt = played(lambda k: [touched(k), *(damaged(k, a) for a in OUTLIERS)])
     losses = np.zeros((COUNT, len(OUTLIERS)))
     for k, (clean, *others) in enumerate(run(same_everywhere, spoilt, options())):
@@ -106,8 +106,8 @@ def test_outlier_in_the_reference(same_everywhere, margins):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_not_finite(same_everywhere, margins, value):
-    """One, 10 or 40 rows: left out. More than half of them: refused, the image cleared, and the
-    next frame as ever."""
+    """One, 10 or 40 rows are left out. If more than half of the rows are not finite, the frame is
+    rejected and its image cleared, and the next frame is not affected."""
     frames, counts, generator = np.tile(touched(0), (6, 1)), (1, 10, 40), np.random.default_rng(5)
     for frame, count in zip(frames[1:5], (*counts, 105), strict=True):
         frame[generator.permutation(len(frame))[:count]] = value
@@ -155,8 +155,8 @@ def test_saturation_in_touch(same_everywhere, margins):
 
 
 def test_saturation_in_the_reference(same_everywhere):
-    """A saturated untouched frame is no reference, whether the touch saturates too or not; the same
-    status everywhere."""
+    """A saturated untouched frame is rejected as a reference, whether the touched frame is
+    saturated or not, with the same status everywhere."""
     untouched, limit = quiet_frames(0), float(np.abs(quiet_frames(0)).max())
     steps: list[Step] = [
         Load(prebuilt()[1]),

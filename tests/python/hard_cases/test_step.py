@@ -20,10 +20,10 @@ PROBLEMS = {"gaussian": gaussian(31), "smooth": smooth(32), "whitened": whitened
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("iterations", [3, 300])
 def test_step_too_long(same_everywhere, margins, solver, iterations):
-    """Up to 2^8 times too long, the halvings leave most of 300 iterations: at least 99 % of what
-    the objective can lose is lost. Where the step cannot be brought down, or there is no time, the
-    image is zero and the stop is "diverged". The active set takes no step
-    from the constant."""
+    """If the step is up to 2^8 times too long, most of 300 iterations remain after its halvings,
+    and the objective falls by at least 99 % of the possible amount. If the step cannot be reduced
+    enough, or no time is left, the image is zero and the stop is "diverged". The active set does
+    not use the constant for a step."""
     within, steps = margins.of(CASE), []
     what = list(product(PROBLEMS, FACTORS, SIGNS))
     for name, factor, sign in what:

@@ -52,8 +52,8 @@ def test_noise_that_flickers(margins):
 
 
 def test_a_finger_that_lifts(margins):
-    """A clear touch that is lifted is no longer reported from the next frame on, and one that comes
-    at its place later is another."""
+    """A clear touch that is lifted is not reported in the next frame. A touch that comes to its
+    place later has another id."""
     place = (10.0, 15.0)
     path = [place] * 8 + [None] * 5 + [place] * 3 + [None] + [place] * 2
     outcomes = [*core(options()).stream(frames_of(path, 1.0, 133))]

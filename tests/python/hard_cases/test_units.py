@@ -41,10 +41,10 @@ def refused(s: np.ndarray) -> bool:
 def check_scaled(
     margins: Margins, case: str, base: Judged, one: Judged, data_off: float, to_base: float
 ) -> None:
-    """S x of both, in the base's units. At the optimum S x moves by at most as much as y (r = y - S
-    x is y's projection onto the dual set, and a projection does not expand), and as far again by
-    lambda, which follows y; S's own rounding adds u |S|_F |x|; and a gap g leaves S x within sqrt(2
-    g) of the optimum's."""
+    """Compare S x of both, in the base's units. At the optimum S x changes by at most the change of
+    y, because r = y - S x is the projection of y onto the dual set, and a projection does not
+    expand. It changes by the same amount again because lambda follows y. The rounding of S adds u
+    |S|_F |x|. With a gap g, S x is within sqrt(2 g) of the optimum's."""
     off = float(np.linalg.norm(base.s @ (one.x * to_base - base.x)))
     size = float(np.linalg.norm(base.y))
     stored = 2 * U * float(np.linalg.norm(base.s)) * float(np.linalg.norm(base.x))

@@ -188,7 +188,7 @@ def test_numbers_of_sections(count):
 
 @pytest.mark.parametrize("size", [0, 16, 48, 64, 80, None])
 def test_sizes_that_no_model_has(size):
-    """The last is no multiple of sixteen."""
+    """The last size is not a multiple of sixteen."""
     blob = tiny_blob() + bytes(8)
     assert not agreed(sealed(blob, total=len(blob) if size is None else size), size)
 
@@ -253,7 +253,7 @@ def runs(blob: bytes) -> None:
 
 
 def test_what_boards_ignore():
-    """META that is no JSON: Python says so, a board runs."""
+    """If META is not JSON, Python rejects the model, and a board accepts it."""
     blob = bytearray(tiny_blob())
     place = sections_of(blob)["META"]
     blob[place.offset] = ord("}")

@@ -172,7 +172,8 @@ def test_the_share_serves_single_presses_and_sums_of_two():
 
 
 def test_more_presses_are_not_promised_wonders(taught):
-    """Five presses of thirty are hopeless; that they become good is no sign of what follows."""
+    """The gain that more presses would bring is not overestimated: the error with five of thirty
+    presses is very large, and its fall must not be continued."""
     curve = taught.report["held_out_by_presses"]
     assert 0.5 * curve["measured_24"] < curve["expected_120"] < curve["expected_60"]
 
