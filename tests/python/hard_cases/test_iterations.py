@@ -30,7 +30,7 @@ def allowance(best: Judged, k: int) -> float:
     inexact gradients (Schmidt, Le Roux and Bach, NIPS 2011, proposition 2): 2 L (|x*| + 2 A)^2 / (k
     + 1)^2, with A = sum_i i e_i / L. e_i is the gradient's error by rounding, for a residual of at
     most 3 |y| and columns whose norm is sqrt(L): it contains the rounding of the residual and that
-    of its products. """
+    of its products."""
     rank, n = best.s.shape
     lipschitz, size = lipschitz_of(best.s), float(np.linalg.norm(best.y))
     error = np.sqrt(lipschitz) * (n + 2 * rank + 4) * U * 3 * size
