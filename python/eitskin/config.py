@@ -116,7 +116,7 @@ def number(
     """Return the number at ``key``, or ``default`` (None: the key is required).
 
     It must be in [low, high], or in (low, high] with ``open_low``. Errors state this range with
-    ``unit``.
+    ``unit``, which is mm where the key says so.
 
     Raises:
         ConfigError: it is missing, not a number, or out of range.
@@ -131,6 +131,7 @@ def number(
         bounds = [f"{'above' if open_low else 'at least'} {low:g}"] if low > float("-inf") else []
         bounds += [f"at most {high:g}"] if high < float("inf") else []
         allowed = " and ".join(bounds) or "finite"
+        unit = unit or ("mm" if key.endswith("_mm") else "")
         allowed += f" {unit}" if unit not in ("", "1") else ""
         raise ConfigError(f"{where}: {key} = {value!r} is out of range; it must be {allowed}")
     try:

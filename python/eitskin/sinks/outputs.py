@@ -158,7 +158,7 @@ class Outputs:
     def lines(self) -> list[str]:
         """The counts as lines of text."""
         return [
-            f"to {one['url']}: {one['sent']} sent"
+            f"to {one['url'].removesuffix(':')}: {one['sent']} sent"
             + (f", {one['dropped']} dropped" if one["dropped"] else "")
             + (f", {one['failed']} failed ({one['error']})" if one["failed"] else "")
             for one in self.counts
@@ -285,4 +285,4 @@ class Queue:
         text = " ".join(str(error).split()) or type(error).__name__
         if text != self._error:
             self._error = text
-            self._say(f"to {self._url}: {text}")
+            self._say(f"to {self._url.removesuffix(':')}: {text}")

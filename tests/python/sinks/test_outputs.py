@@ -94,7 +94,7 @@ def test_a_sink_that_raises_systemexit_has_failed_and_goes_on(swipe, made):
         leaving, good = outputs.end({})
     assert (leaving["sent"], leaving["failed"]) == (4, 1)
     assert leaving["error"] == "this sink has seen enough"
-    assert said == ["to leaving:: this sink has seen enough"]
+    assert said == ["to leaving: this sink has seen enough"]
     assert (good["sent"], good["failed"]) == (5, 0)
 
 
@@ -126,7 +126,7 @@ def test_a_stuck_and_a_dying_sink_disturb_no_other(swipe, made, patient, monkeyp
     assert (dying["sent"], dying["failed"], dying["error"]) == (2, whole - 2, "the cable is out")
     assert (away["sent"], away["dropped"], away["failed"]) == (0, whole, 0)
     assert (stuck["sent"], stuck["dropped"]) == (0, whole - 1)
-    assert said == ["to dying:: the cable is out"]
+    assert said == ["to dying: the cable is out"]
     assert made["good"].closed.is_set() and not made["stuck"].closed.is_set()
 
 
@@ -145,6 +145,13 @@ def test_an_impatient_session_never_waits(swipe, drives, made):
 def test_a_message_is_made_once_for_all(swipe):
     reported = OutgoingMessage(swipe.frames[20])
     assert reported.message is reported.message and reported.text is reported.text
+
+
+def test_a_sink_without_an_address_is_named_with_one_colon(swipe, monkeypatch):
+    counts = [{"url": "ros2:", "sent": 3, "dropped": 0, "failed": 0, "error": None}]
+    monkeypatch.setattr(Outputs, "counts", property(lambda outputs: counts))
+    with Outputs([], swipe.source) as outputs:
+        assert outputs.lines == ["to ros2: 3 sent"]
 
 
 REFUSED = [
