@@ -22,6 +22,7 @@ from eitskin.tuning.front import (
 from eitskin_studies.harness.sections import Tabular, fill_marks
 from eitskin_studies.tradeoff.equal import best_table, equal_table, scan_table
 from eitskin_studies.tradeoff.fronts import chosen_presets
+from eitskin_studies.tradeoff.scene_sets import HEADLINE
 from eitskin_studies.tradeoff.table import best_points
 
 PICTURES = "pictures/tradeoff"
@@ -64,6 +65,10 @@ FOLLOWED_HEAD = (
     "solver's image: accurate / default",
     "image shown: accurate / default",
 )
+SETTINGS_HEAD = (
+    "setting", "image, 40 dB", "image, 60 dB", "image, 80 dB", "shown, 40 dB", "shown, 60 dB",
+    "shown, 80 dB", "discs", "discs, light touches", "kMAC",
+)  # fmt: skip
 RECOMMENDED_HEAD = (
     "budget",
     "point for the mean frame",
@@ -105,6 +110,26 @@ def front_table(front: Front) -> Tabular:
             )
         )
     return FRONT_HEAD, rows
+
+
+def settings_table(front: Front) -> Tabular:
+    """Mean MIoU and multiply-accumulates of every setting, which the page's sentences quote."""
+
+    def mean(point: OperatingPoint, what: str, name: str = HEADLINE, snr_db: float = 60.0) -> str:
+        score = point.scores.get(name, {}).get(f"{snr_db:g}")
+        return "-" if score is None or what not in score else _share(score[what]["mean"])
+
+    rows = []
+    for point in front.points:
+        macs = point.macs(Conditions())
+        seen = (
+            mean(point, what, snr_db=snr_db)
+            for what in ("image", "drawn")
+            for snr_db in MEASURED_DB
+        )
+        discs = mean(point, "discs"), mean(point, "discs", "light")
+        rows.append((point.name, *seen, *discs, "-" if macs is None else f"{macs[0] / 1e3:.0f}"))
+    return SETTINGS_HEAD, rows
 
 
 def preset_table(front: Front) -> Tabular:
@@ -229,8 +254,8 @@ def conditions(front: Front) -> str:
 
 
 def fill_page(page: Path, front: Front, pictures: Path, names: tuple[str, ...]) -> None:
-    """Fill the marks ``conditions``, ``best``, ``presets``, ``followed``, ``equal``, ``scans``
-    and ``front`` of ``page``; pictures go into ``PICTURES`` beside it.
+    """Fill the marks ``conditions``, ``best``, ``presets``, ``followed``, ``equal``, ``scans``,
+    ``front`` and ``knobs`` of ``page``; pictures go into ``PICTURES`` beside it.
 
     Raises:
         FileError: the page cannot be read or written.
@@ -244,6 +269,7 @@ def fill_page(page: Path, front: Front, pictures: Path, names: tuple[str, ...]) 
         "scans": scan_table(),
         "front": front_table(front),
         "recommendations": recommendation_table(front),
+        "settings": settings_table(front),
     }
     texts = {"conditions": conditions(front)}
     fill_marks(page, "tradeoff", (texts, tables))
