@@ -308,6 +308,14 @@
  * FAST_RHO_WIDER_MM */
 #define EITS_FAST_PALM_MM R(25.0)
 
+/* a frame's touch with a greater radius is a palm [mm]. larger: a small palm is followed as a
+ * finger; smaller: two fingers become a palm */
+#define EITS_FAST_BROAD_MM R(17.0)
+
+/* if it also explains more than this [of |y|^2]. larger: as FAST_BROAD_MM; smaller: a disc of a
+ * palm that lands becomes the palm */
+#define EITS_FAST_BROAD_SHARE R(0.8)
+
 /* a frame's touch with less is one of the discs that the solver makes of a palm [of a palm's
  * strength]. larger: a light finger beside a palm is missed; smaller: touches at its rim */
 #define EITS_FAST_PALM_REST R(0.1)

@@ -6,6 +6,7 @@
 #include "context/context.h"
 #include "eitskin/fast.h"
 #include "fast/constants.h"
+#include "search/constants.h"
 #include "search/trial.h"
 
 _Static_assert(EITS_FAST_MAX_TOUCHES == EITS_FAST_TOUCHES, "the header's");
@@ -110,6 +111,8 @@ struct eits_fast {
     uint32_t drive_count;
     uint32_t unexplained, newsy; /* a bit for each of the last 32 drives */
     uint32_t unexplained_frames, frame_explained;
+    uint32_t smeared;    /* 1: a touch moved or changed in the last frame, and the frame was
+                            not aligned */
     uint32_t decided;    /* whether the last solved frame alone decided where touches are */
     uint32_t aligned_us; /* time of the last alignment of a frame, and the time between it and the
                             one before */
@@ -298,6 +301,17 @@ static inline int fast_is_rest(const eits_fast *fast, const eits_real *place, ei
     return 0;
 }
 
+/* The square of the radius at which a palm's soft disc ends. */
+#define FAST_PALM_MM2 (EITS_FAST_RHO_WIDER_MM * EITS_FAST_RHO_WIDER_MM)
+
+/* Return 1 if a touch of the last frame is a whole palm: it is broad, and the frame holds hardly
+ * anything else. Touches that explain the frame's drives are better known than that. */
+static inline int fast_is_whole_palm(const eits_fast *fast, const eits_touch *found)
+{
+    return !fast->frame_explained && found->radius_mm > EITS_FAST_BROAD_MM &&
+           found->explained > EITS_FAST_BROAD_SHARE;
+}
+
 /* ---- rows.c ---- */
 
 /* Collect the pixels of a touch's soft disc, which ends at the root of `rho2`. Returns 0 if none of
@@ -323,6 +337,14 @@ void eits_fast_add_interplay(const eits_fast *fast, uint32_t drive, const fast_s
 /* After a frame was aligned: keep ids for the touches that its report may name, and let drives find
  * the touches that only frames have shown. */
 void eits_fast_expect_touches(eits_fast *fast);
+/* Return 1 if the solved frame alone decides where touches are: the drives were left unexplained
+ * for so long that the solver was asked, and its touches explain the whole frame. They would not
+ * explain a frame in which a finger landed. */
+int eits_fast_decides(const eits_fast *fast);
+/* Return which of the touches of a frame, which are `at` these places, is a whole palm on which
+ * `place` lies; `count` if none is. */
+uint32_t eits_fast_whole_palm(const eits_fast *fast, const eits_touch *found,
+                              const eits_real (*at)[2], uint32_t count, const eits_real *place);
 /* When drives begin again: let them find the touches that they followed before. */
 void eits_fast_expect_again(eits_fast *fast);
 /* Return the id of a touch that starts at `place`. */

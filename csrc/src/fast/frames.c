@@ -113,11 +113,14 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     int explained = fast->held_count == 0;
     for (uint32_t n = 0; n < fast->drives; ++n)
         explained &= fast->drive[n].explained;
-    fast->n_off = 0;
+    fast->n_off = fast->smeared = 0;
     for (uint32_t k = 0; k < fast->count; ++k) {
         /* Tracks that do not explain the drives cannot bring them to one instant. */
-        if (has_moved(fast, k, &fast->stirred) && explained)
+        uint32_t perhaps = 0;
+        if (has_moved(fast, k, &perhaps) && explained)
             align_touch(fast, k, aligned);
+        fast->stirred |= perhaps;
+        fast->smeared |= perhaps && !explained;
         fast->stirred |= !fast->known[k].on;
         fast->known[k].aligned = 1;
         eits_copy(fast->known[k].at, fast->state + FAST_SIZE * k, 2);
@@ -141,9 +144,9 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
 }
 
 /* Pairs of touches that were aligned and of those found, the nearest first, each within the room
- * that the touch takes; owner[n]: the touch of found n, or FAST_NONE. */
-static void match(const eits_fast *fast, const eits_real (*found)[2], uint32_t count,
-                  uint8_t *owner)
+ * that the wider of the two takes; owner[n]: the touch of found n, or FAST_NONE. */
+static void match(const eits_fast *fast, const eits_touch *touches, const eits_real (*found)[2],
+                  uint32_t count, uint8_t *owner)
 {
     uint32_t taken = 0;
     memset(owner, FAST_NONE, count);
@@ -153,8 +156,11 @@ static void match(const eits_fast *fast, const eits_real (*found)[2], uint32_t c
         for (uint32_t k = 0; k < fast->count; ++k) {
             for (uint32_t n = 0; n < count; ++n) {
                 const eits_real far = fast_distance2(fast->known[k].at, found[n]);
+                const eits_real room = fast_room_of_mm(fast, fast_is_whole_palm(fast, &touches[n])
+                                                                 ? FAST_PALM_MM2
+                                                                 : fast->known[k].rho2);
                 if (fast->known[k].aligned && (taken >> k & 1u) == 0 && owner[n] == FAST_NONE &&
-                    far < fast_square(fast_room_mm(fast, k)) && (nearest < 0 || far < nearest)) {
+                    far < fast_square(room) && (nearest < 0 || far < nearest)) {
                     nearest = far;
                     from = k;
                     to = n;
@@ -177,17 +183,6 @@ static void mask_named(eits_fast *fast)
         fast->masked[i] = (states[row[0]] | states[row[1]] | states[row[2]] | states[row[3]]) != 0;
         fast->faulty |= fast->masked[i];
     }
-}
-
-/* Whether the solved frame alone decides where touches are: the drives were left unexplained for so
- * long that the solver was asked, and its touches explain the whole frame. They would not explain a
- * frame in which a finger landed. */
-static int decides(const eits_fast *fast)
-{
-    const eits_info *info = &fast->ctx->info;
-    return fast->unexplained_frames > EITS_FAST_FRAMES &&
-           info->unexplained < EITS_FAST_DECIDES_LEFT &&
-           (info->diagnostics & ~(uint32_t)EITS_DIAGNOSTIC_CROWDED) == 0;
 }
 
 static int near_any(const eits_real *place, const eits_real (*others)[2], uint32_t count)
@@ -248,13 +243,14 @@ static void seed(eits_fast *fast, const eits_touch *found, const eits_real (*at)
             continue;
         /* Two frames on end, unless one decides: in a single one, a touch that landed while it was
          * scanned may stand at a wrong place. */
-        if ((!decides(fast) && !near_any(state, (const eits_real(*)[2])before, known)) ||
+        if ((!eits_fast_decides(fast) && !near_any(state, (const eits_real(*)[2])before, known)) ||
             fast->count == EITS_FAST_MAX_TOUCHES || near_known(fast, state)) {
             if (fast->seeds < EITS_FAST_MAX_TOUCHES)
                 eits_copy(fast->seed[fast->seeds++], state, 2);
             continue;
         }
-        eits_fast_add(fast, state, none, 4 * EITS_FAST_FAINT, fast->rho2);
+        eits_fast_add(fast, state, none, 4 * EITS_FAST_FAINT,
+                      fast_is_whole_palm(fast, &found[n]) ? FAST_PALM_MM2 : fast->rho2);
         set_by_frame(fast, fast->count - 1, state, c);
     }
 }
@@ -289,8 +285,9 @@ static void put(eits_fast *fast, uint32_t k, const eits_real *before, const eits
 /* A touch that two frames on end show elsewhere is put there. If drives explain a frame, a touch
  * that moves is theirs; if they do not, it may have gone on between the two frames, and the first
  * of them may still have agreed. One frame that decides puts a touch as a still one; where the
- * frame before decided too, a touch that is elsewhere again moves. */
-static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_real c)
+ * frame before decided too, a touch that is elsewhere again moves. A touch that turns out to be a
+ * `palm` is put as one. */
+static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_real c, int palm)
 {
     fast_known *known = &fast->known[k];
     const fast_last before = known->last;
@@ -304,11 +301,14 @@ static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_re
     known->last = far2 < fast_square(EITS_FAST_AGREE_MM) ? FAST_AGREED : FAST_ELSEWHERE;
     if (known->last == FAST_AGREED)
         known->confirmed = 1;
-    if (!fast_is_palm(known->rho2)) {
+    if (palm && !fast_is_palm(known->rho2)) {
+        known->rho2 = FAST_PALM_MM2;
+        set_by_frame(fast, k, place, c);
+    } else if (!fast_is_palm(known->rho2)) {
         const int elsewhere = known->last == FAST_ELSEWHERE;
         const int goes = elsewhere && fast->decided && (known->moving || before == FAST_ELSEWHERE);
         const eits_real most = known->moving ? EITS_FAST_AGREE_MM : EITS_FAST_DECIDES_MM;
-        if (decides(fast) && !goes && far2 > fast_square(most))
+        if (eits_fast_decides(fast) && !goes && far2 > fast_square(most))
             set_by_frame(fast, k, place, c);
         else if (elsewhere && again && !(known->moving && fast->frame_explained))
             put(fast, k, known->place, place, c);
@@ -331,20 +331,22 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
         eits_place_in_model(fast->ctx, at[n]);
     }
     mask_named(fast);
-    match(fast, (const eits_real(*)[2])at, count, owner);
+    match(fast, found, (const eits_real(*)[2])at, count, owner);
     uint32_t seen = 0;
     for (uint32_t n = 0; n < count; ++n) {
         if (owner[n] == FAST_NONE)
             continue;
         seen |= 1u << owner[n];
-        correct(fast, owner[n], at[n], fast->sign * found[n].strength_s_per_m_mm2);
+        correct(fast, owner[n], at[n], fast->sign * found[n].strength_s_per_m_mm2,
+                fast_is_whole_palm(fast, &found[n]));
     }
     for (uint32_t k = fast->count; k-- > 0;) {
         fast_known *known = &fast->known[k];
         if (!known->aligned || (seen >> k & 1u) != 0 || !known->on)
             continue;
         known->last = FAST_NOT_SEEN;
-        if (++known->frames_missed >= EITS_FAST_LOST_FRAMES)
+        if (++known->frames_missed >= EITS_FAST_LOST_FRAMES ||
+            eits_fast_whole_palm(fast, found, (const eits_real(*)[2])at, count, known->at) < count)
             eits_fast_drop(fast, k);
     }
     for (uint32_t k = 0; k < fast->count; ++k)
@@ -352,7 +354,7 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
     /* a frame with rows that are no touch's may show any */
     seed(fast, found, (const eits_real(*)[2])at, owner, fast->wild == 0 ? count : 0);
     fast->wild = 0;
-    fast->decided = (uint32_t)decides(fast);
+    fast->decided = (uint32_t)eits_fast_decides(fast);
     return EITS_OK;
 }
 

@@ -204,6 +204,27 @@ static uint32_t nearest(const eits_real *place, const eits_real (*found)[2], con
     return best;
 }
 
+/* ---- what a solved frame is worth ---- */
+
+int eits_fast_decides(const eits_fast *fast)
+{
+    const eits_info *info = &fast->ctx->info;
+    return fast->unexplained_frames > EITS_FAST_FRAMES &&
+           info->unexplained < EITS_FAST_DECIDES_LEFT &&
+           (info->diagnostics & ~(uint32_t)EITS_DIAGNOSTIC_CROWDED) == 0;
+}
+
+uint32_t eits_fast_whole_palm(const eits_fast *fast, const eits_touch *found,
+                              const eits_real (*at)[2], uint32_t count, const eits_real *place)
+{
+    const eits_real room = fast_room_of_mm(fast, FAST_PALM_MM2);
+    uint32_t n = 0;
+    while (n < count && !(fast_is_whole_palm(fast, &found[n]) &&
+                          fast_distance2(at[n], place) < fast_square(room)))
+        ++n;
+    return n;
+}
+
 /* ---- touches that drives may find ---- */
 
 static void expect(eits_fast *fast, uint32_t id, eits_real x_mm, eits_real y_mm)
@@ -293,7 +314,8 @@ static void weigh_places(const eits_fast_touch *followed, eits_touch *found)
 }
 
 /* The touches that drives followed when the frame was aligned; returns their number. Those found
- * that are one of them are taken, and those that a lifted touch has left. */
+ * that are one of them are taken, and those that a lifted touch has left. Several of them on a
+ * palm that was found whole are one. */
 static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, uint32_t count,
                                 uint8_t *taken, eits_touch *touches)
 {
@@ -302,20 +324,27 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
         at[n][0] = found[n].x_mm;
         at[n][1] = found[n].y_mm;
     }
+    uint32_t reported = 0;
     for (uint32_t k = 0; k < fast->n_followed; ++k) {
         const eits_fast_touch *t = &fast->followed[k];
         const eits_real place[2] = {t->x_mm, t->y_mm};
-        const uint32_t n = nearest(place, (const eits_real(*)[2])at, taken, count);
+        const eits_real(*places)[2] = (const eits_real(*)[2])at;
+        uint32_t n = eits_fast_whole_palm(fast, found, places, count, place);
+        if (n == count)
+            n = nearest(place, places, taken, count);
+        else if (taken[n])
+            continue;
         const int agrees =
             n < count && fast_distance2(at[n], place) < fast_square(EITS_FAST_AGREE_MM);
         /* where the two differ, the frame's place is the better one; but of a palm it has discs */
         const int palm = fast_is_palm(fast_square(EITS_FAST_SOFT_RADIUS * t->radius_mm));
         const int shown = agrees || (n < count && !palm);
-        touches[k] = shown ? found[n] : alone(fast, t);
+        eits_touch *touch = &touches[reported++];
+        *touch = shown ? found[n] : alone(fast, t);
         if (shown)
-            weigh_places(t, &touches[k]);
-        touches[k].id = t->id;
-        touches[k].confirmed = agrees || t->confirmed;
+            weigh_places(t, touch);
+        touch->id = t->id;
+        touch->confirmed = agrees || t->confirmed;
         if (n < count)
             taken[n] = 1;
     }
@@ -324,15 +353,15 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
         if (n < count)
             taken[n] = 1;
     }
-    return fast->n_followed;
+    return reported;
 }
 
 /* Touches that drives follow, `touches` of this frame, are followed from frame to frame as well, in
  * case drives lose them. Two frames must then show one before it is reported: what a lift leaves
  * of a frame is not there in the next. */
-static void keep_followed(eits_fast *fast, const eits_touch *touches)
+static void keep_followed(eits_fast *fast, const eits_touch *touches, uint32_t count)
 {
-    for (uint32_t k = 0; k < fast->n_followed && fast->n_seen < EITS_MAX_TOUCHES; ++k) {
+    for (uint32_t k = 0; k < count && fast->n_seen < EITS_MAX_TOUCHES; ++k) {
         fast_seen *s = &fast->seen[fast->n_seen++];
         *s = start(fast, &touches[k]);
         s->id = touches[k].id;
@@ -402,6 +431,17 @@ static int is_rest(const eits_fast *fast, const eits_touch *found)
     return 0;
 }
 
+/* Whether what the solver found is no better known than what drives follow: a touch grew, fell or
+ * moved while the frame was scanned, and the frame could not be aligned. A palm that lands is found
+ * as several discs then. */
+static int is_smeared(const eits_fast *fast, const eits_touch *found, uint32_t count)
+{
+    int smeared = fast->smeared && !eits_fast_decides(fast);
+    for (uint32_t n = 0; n < count; ++n)
+        smeared &= !fast_is_whole_palm(fast, &found[n]);
+    return smeared;
+}
+
 eits_status eits_fast_report(eits_fast *fast, const eits_touch *found, uint32_t n_found,
                              eits_touch *touches, uint32_t *count)
 {
@@ -413,9 +453,14 @@ eits_status eits_fast_report(eits_fast *fast, const eits_touch *found, uint32_t 
         return EITS_E_ARGUMENT;
     const int drives = fast->aligned != 0;
     fast->aligned = *count = 0;
+    if (drives && is_smeared(fast, found, n_found)) {
+        found = NULL;
+        n_found = 0;
+    }
+    uint32_t followed = 0;
     if (drives) {
         forget_followed(fast);
-        *count = report_followed(fast, found, n_found, taken, touches);
+        followed = *count = report_followed(fast, found, n_found, taken, touches);
     }
     if (found != NULL) {
         for (uint32_t n = 0; n < n_found; ++n) {
@@ -426,7 +471,7 @@ eits_status eits_fast_report(eits_fast *fast, const eits_touch *found, uint32_t 
         report_seen(fast, drives, touches, count);
     }
     if (drives)
-        keep_followed(fast, touches);
+        keep_followed(fast, touches, followed);
     sort(touches, *count);
     return EITS_OK;
 }

@@ -84,8 +84,11 @@ def test_they_are_told_soon_where_they_are_and_how_fast(recorded):
     assert any(len(frame.touches) == 1 for frame in frames)
 
 
-@pytest.mark.parametrize(("x_mm", "y_mm"), [(37.48, -10.13), (-27.9, 14.6)])
-def test_a_palm_that_lands_slowly_does_not_run_away(tmp_path, x_mm, y_mm):
+@pytest.mark.parametrize(
+    ("x_mm", "y_mm", "from_s"),
+    [(37.48, -10.13, 0.0125), (-27.9, 14.6, 0.002), (-24.2, 19.9, 0.0125)],
+)
+def test_a_palm_that_lands_slowly_is_one_touch_in_its_place(tmp_path, x_mm, y_mm, from_s):
     place = f"x_mm = {x_mm}, y_mm = {y_mm}"
     path = tmp_path / "palm.toml"
     path.write_text(
@@ -99,15 +102,17 @@ elements = 3500
 [[touch]]
 radius_mm = 22.0
 contrast = 2.0
-path = [{{t_s = 0.0125, {place}, press = 0.0}}, {{t_s = 0.1325, {place}, press = 1.0}}]
+path = [{{t_s = {from_s}, {place}, press = 0.0}}, {{t_s = {from_s + 0.12}, {place}, press = 1.0}}]
 [effects.noise]
 snr_db = 60.0
 """,
         encoding="utf-8",
     )
-    touches = [one for item in followed(f"sim:{path}", PALM) for one in item.touches]
+    told = followed(f"sim:{path}", PALM)
+    touches = [one for item in told for one in item.touches]
     assert len(touches) > 80
     assert max(np.hypot(one.x_mm - x_mm, one.y_mm - y_mm) for one in touches) < 12
+    assert max(len(item.touches) for item in told if isinstance(item, Frame)) == 1
 
 
 def test_their_messages_keep_to_the_schema(recorded):
