@@ -9,13 +9,13 @@ typedef struct size {
 
 static const size SIZES[] = {
     {"16 electrodes, coarse", 16, 208, 104, 32, 20, 316},
-    {"16 electrodes, as shipped", 16, 208, 104, 64, 32, 812},
+    {"16 electrodes, the prebuilt model", 16, 208, 104, 64, 32, 812},
     {"16 electrodes, full rank", 16, 208, 104, 104, 32, 812},
     {"16 electrodes, fine", 16, 208, 104, 104, 40, 1264},
     {"32 electrodes", 32, 928, 464, 128, 32, 812},
 };
 
-/* Bytes of an .eitm but for its JSON and padding: matrices, fields, table, grid, golden frame. */
+/* Bytes of an .eitm without its JSON and padding: matrices, fields, table, grid, golden frame. */
 static size_t model_bytes(const size *s, size_t bytes_a_number)
 {
     const size_t stride = EITS_STRIDE(s->rank);
