@@ -145,5 +145,5 @@ def for_page(curves: GapCurves, command: str) -> Filling:
                 f"{one.miou:.3f}".lstrip("0"), f"{one.worst_tenth:.3f}".lstrip("0"),
             )
         )  # fmt: skip
-    run = f"By `{command}`: thresholds from {curves.train}, numbers of {curves.test}."
+    run = f"By `{command}`, with the scenes `{curves.train}` and `{curves.test}`."
     return {"optimum-run": run}, {"optimum": (HEAD, rows)}
