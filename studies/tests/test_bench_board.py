@@ -1,4 +1,4 @@
-"""``eitskin bench board``: its numbers are those of the runs, and its page describes them."""
+"""``eitskin bench board``: its numbers are those of the runs, its page says what they are."""
 
 import json
 from pathlib import Path

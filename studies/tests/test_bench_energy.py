@@ -1,4 +1,4 @@
-"""Energy per frame: the sum of the parts, and the sentences of the page."""
+"""Energy a frame: what is summed, and that the page says so."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Sets of configurations: their valid keys and values, and the built-in set."""
+"""Configurations: what a set may say, and what the built-in one holds."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
-"""The experiment on many touches: its scenes, its numbers, how it reports uncertainty, and
-continuing an interrupted run."""
+"""The experiment on many touches: its scenes, its numbers, its doubt, and that a run goes on where
+it was."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,5 @@
-/* Sections MOVE and ROWE: corrections of places by the reference, forwards and backwards. */
+/* Sections MOVE and ROWE, and what the reference makes of them: places go to where touches lie, and
+ * back. */
 #include "check.h"
 #include "small_model.h"
 

@@ -76,7 +76,7 @@ static void check_residual(eits_context *ctx, const eits_fit *f)
         CHECK_NEAR(f->residual[i], left[i], 100 * EPS * size);
 }
 
-/* They are found at any position in the list. */
+/* Wherever they stand among the others. */
 static void two_halves_become_one(int first)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
@@ -213,12 +213,15 @@ TEST(one_large_touch_stays_one)
         const eits_disc truth[2] = {{3, 5, 20, R(0.05), 1}, {-39, -33, 9, others[rest], 1}};
         press(ctx, truth, 2);
         eits_fit f = begin(ctx, truth, 1);
+        f.macs = 0;
+        eits_fit_move_all(ctx, &ctx->scratch, &f, 1);
+        const uint64_t step = f.macs;
+        f = begin(ctx, truth, 1);
         const eits_disc before = f.disc[0];
         CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), 0);
         CHECK_EQUAL(f.count, 1);
         CHECK((f.macs > 0) == (rest > 0)); /* nothing left: nothing is tried */
-        const uint32_t moves = f.moves;
-        given_up += moves > 0 && moves <= 2 * EITS_SPLIT_SWEEPS;
+        given_up += f.macs > 4 * step && f.macs < 3 * EITS_SPLIT_SWEEPS * step;
         CHECK(memcmp(&before, &f.disc[0], sizeof before) == 0);
         check_residual(ctx, &f);
         f.noise = f.total; /* all that is left may be noise */
@@ -229,8 +232,9 @@ TEST(one_large_touch_stays_one)
     CHECK(given_up > 0);
 }
 
-/* Once the fit has made as many moves as it may, discs stay as many as they are. */
-TEST(moves_are_bounded)
+/* Once the frame's work has reached its limit, discs stay as many and where they are; a step that
+ * has begun is completed. */
+TEST(work_is_bounded)
 {
     const eits_disc near[2] = {{-10, 6, 9, R(0.05), 1}, {12, 6, 9, R(0.05), 1}},
                     one = {1, 6, 14, R(0.04), 1};
@@ -238,13 +242,21 @@ TEST(moves_are_bounded)
     press(ctx, near, 2);
     for (uint32_t left = 0; left < 2; ++left) {
         eits_fit f = begin(ctx, near, 2);
-        f.moves = EITS_MERGE_MOVES - left;
+        f.macs = eits_fit_limit(ctx, EITS_FIT_WORK) - left;
         CHECK_EQUAL(eits_fit_merge(ctx, &ctx->scratch, &f), 0);
-        CHECK((f.moves > EITS_MERGE_MOVES) == left);
+        CHECK((f.macs > eits_fit_limit(ctx, EITS_FIT_WORK)) == left);
         f = begin(ctx, &one, 1);
-        f.moves = EITS_SPLIT_MOVES - left;
+        f.macs = eits_fit_limit(ctx, EITS_SPLIT_WORK) - left;
         CHECK_EQUAL(eits_fit_split(ctx, &ctx->scratch, &f), left);
-        CHECK((f.moves > EITS_SPLIT_MOVES) == left);
+        CHECK((f.macs > eits_fit_limit(ctx, EITS_SPLIT_WORK)) == left);
+        f = begin(ctx, near, 2);
+        f.disc[0].x_mm += 2;
+        eits_fit_restart(ctx, &ctx->scratch, &f);
+        f.macs = eits_fit_limit(ctx, EITS_FIT_WORK) - left;
+        eits_fit_move_all(ctx, &ctx->scratch, &f, 4);
+        CHECK_EQUAL(f.disc[0].x_mm != near[0].x_mm + 2, left);
+        CHECK_EQUAL(f.disc[1].x_mm, near[1].x_mm);
+        CHECK_EQUAL(f.cut, 1);
     }
 }
 

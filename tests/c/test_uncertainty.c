@@ -1,4 +1,5 @@
-/* The section UNCE: the model's errors, and the values that a reader rejects. */
+/* The section UNCE: what it says the model may be wrong by, and everything that a reader refuses.
+ */
 #include "base/vec.h"
 #include "check.h"
 #include "small_model.h"
@@ -60,7 +61,7 @@ static void it_is_read_in_place(void)
 
 static void what_is_no_second_moment_is_refused(void)
 {
-    /* place and value: NaN, variances below 0, shares below 0 or infinite */
+    /* where, and what: numbers that are none, variances below 0, shares below 0 or without end */
     static const struct {
         uint32_t at;
         float value;

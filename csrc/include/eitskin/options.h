@@ -138,7 +138,7 @@ typedef struct eits_options {
     uint32_t touch_test;
     /* the most columns that the touch test may compute per frame (about 6 kMAC each at rank 64)
      * after a first look at each touch. When they are used up, the touches found so far are
-     * reported as crowded; 0: no limit */
+     * reported as crowded; 0: no limit but the frame's budget (TEST_WORK) */
     uint32_t test_columns;
     /* > 0: reference tracking: while nothing touches the skin, the reference follows it with this
      * time constant, in frames; 0: the reference stays as it was taken. The default is 0, in taught

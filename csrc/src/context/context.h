@@ -199,8 +199,8 @@ typedef struct eits_evidence {
     eits_real *gain_drift; /* stride: R'^-1 times the direction of gain drift, scaled to length 1 */
     uint32_t drifts;       /* 1: gain_drift is in use */
     uint32_t columns_made; /* columns computed since the test of this frame began */
-    uint32_t columns_most; /* the present limit of columns_made; 0: no limit */
-    uint32_t spent;        /* 1: the test needed more columns than options.test_columns allows */
+    uint32_t columns_most; /* the present limit of columns_made */
+    uint32_t spent;        /* 1: the test needed more columns than it had */
 } eits_evidence;
 
 /* Memory of the multipole model: L electrodes, slots of EITS_POLE_FIELD(L) numbers. Written by
@@ -241,7 +241,6 @@ typedef struct eits_joint_memory {
     eits_real error_unit;
     eits_real energy; /* |W d|^2 minus its part along the drift: the misfit without touches */
     eits_real *normal, *factor, *kept; /* EITS_JOINT_TRIANGLE each, packed by rows */
-    uint64_t spent;                    /* multiply-accumulates of this frame's joint fits */
     uint64_t evaluated;                /* multiply-accumulates of the last evaluation with slopes */
     eits_real gradient[EITS_JOINT_PARAMETERS];
     uint32_t is_known; /* 1: `known` belongs to the normal equations and shapes as they are */

@@ -109,7 +109,7 @@ void eits_check_count(eits_context *ctx, const eits_fit *f)
     if (!f->tested || !eits_wants(ctx, EITS_DIAGNOSTIC_CROWDED) || eits_is_faint(ctx))
         return;
     for (uint32_t k = 0; k < f->count; ++k) {
-        if (ctx->evidence.spent || f->pair[k] > EITS_PAIR_ODDS ||
+        if (ctx->evidence.spent || f->cut || f->pair[k] > EITS_PAIR_ODDS ||
             f->confidence[k] < EITS_MIN_CONFIDENCE)
             ctx->info.diagnostics |= EITS_DIAGNOSTIC_CROWDED;
     }

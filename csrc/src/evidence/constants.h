@@ -40,19 +40,14 @@
  * smaller: a frame costs more than test_columns says */
 #define EITS_TRIAL_COLUMNS 2
 
-/* ---- Chosen: on the tuning family of the worlds (seeds 41 and 42, 100 scenes of each of seven
- * sets): with 40 or 60 as a minimum 3 to 4 of 200 frames of five discs 2.5 radii apart are lost,
- * with 80 none; of 200 frames of ellipses (seeds 21 and 22) one more is wrong than with 200
- * columns, of 200 frames of fingers one less; the board's worst of 180 frames (seed 1) then has 4.9
- * million instructions. Check: eitskin bench worlds */
+/* the test of touches computes no further columns after so many [multiply-accumulates per fold].
+ * larger: less is left for the joint fit of the tested touches; smaller: more frames are crowded */
+#define EITS_TEST_WORK 30000
 
-/* part of test_columns for the test of a skin that does not look drifted, minus the number of steps
- * that the fit has made [columns]. larger: more work; smaller: odd shapes become touches, and more
- * frames are crowded */
-#define EITS_STILL_COLUMNS 120
-
-/* but at least this many [columns]. as STILL_COLUMNS */
-#define EITS_STILL_MIN 80
+/* cost of a column, above the rank [multiply-accumulates over the rank]: at rank 64 columns take
+ * 4,000 to 8,700, with all that the test computes beside them [numbers]. larger: less is tried;
+ * smaller: a frame costs more than TEST_WORK says */
+#define EITS_COLUMN_ROWS 48
 
 /* ---- Chosen: on the tuning family of the worlds (seeds 21 and 22, 100 scenes a set): 1.5 of 1.5,
  * 2 and 3 gives the most right counts, and the fewest right counts that are called crowded. Check:

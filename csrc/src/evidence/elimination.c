@@ -89,7 +89,7 @@ int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict 
         if (!to_the_end &&
             eits_excess(ctx, v->answer.misfit, v->answer.count) >
                 (v->fitted ? EITS_FITS : EITS_FITS_AS_DISCS) &&
-            eits_may_make_later(ctx, others))
+            eits_may_make(ctx, others))
             return 0;
         eits_answer rest = v->answer;
         drop_linearly(ctx, scratch, v, weakest, &rest, &now, macs);
@@ -111,7 +111,7 @@ int eits_eliminate(eits_context *ctx, const eits_scratch *scratch, eits_verdict 
                 *macs += eits_linearise(ctx, scratch, &v->answer, &now);
             weakest = eits_look(ctx, scratch, v, &now);
         }
-        if (!to_the_end && !eits_fits(ctx, v) && eits_may_make_later(ctx, others))
+        if (!to_the_end && !eits_fits(ctx, v) && eits_may_make(ctx, others))
             return 0;
         if (v->rise[weakest] < eits_needed_rise(ctx, v) &&
             !eits_may_make(ctx, 2 * eits_columns_of(&v->answer)))

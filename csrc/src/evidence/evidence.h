@@ -84,9 +84,6 @@ typedef struct eits_likelihood {
  * the final answer. */
 int eits_may_make(eits_context *ctx, uint32_t columns);
 
-/* The same for the last trials of a frame, which may use all of options.test_columns. */
-int eits_may_make_later(eits_context *ctx, uint32_t columns);
-
 /* Linearise F about the answer: fills in evidence.column, evidence.left and scratch->square. */
 uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,
                         eits_likelihood *out);

@@ -103,22 +103,12 @@ static void invert(const eits_context *ctx, const eits_scratch *scratch, uint32_
     }
 }
 
-static int may_make(eits_context *ctx, uint32_t columns, uint32_t most)
-{
-    const int may = most == 0 || (ctx->evidence.columns_made <= most &&
-                                  columns <= most - ctx->evidence.columns_made);
-    ctx->evidence.spent |= !may;
-    return may;
-}
-
 int eits_may_make(eits_context *ctx, uint32_t columns)
 {
-    return may_make(ctx, columns, ctx->evidence.columns_most);
-}
-
-int eits_may_make_later(eits_context *ctx, uint32_t columns)
-{
-    return may_make(ctx, columns, ctx->options.test_columns);
+    const uint32_t made = ctx->evidence.columns_made, most = ctx->evidence.columns_most;
+    const int may = made <= most && columns <= most - made;
+    ctx->evidence.spent |= !may;
+    return may;
 }
 
 uint64_t eits_linearise(eits_context *ctx, const eits_scratch *scratch, const eits_answer *answer,

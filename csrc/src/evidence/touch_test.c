@@ -8,12 +8,9 @@
  * leaves it a chance. At last each disc whose shape says that it is two touches rather than one is
  * tried as two.
  *
- * A frame costs no more than options.test_columns allows: each step asks first whether it may
- * (eits_may_make). Where it may not, the answer so far is reported, and the count is said to be
- * uncertain. A sheet that has drifted shows at the first look, and all those columns are needed to
- * tell its touches from the effects of the drift. On other sheets more columns mostly change
- * nothing: fit and test together then have EITS_STILL_COLUMNS, where a move of a disc costs about
- * as much as a column. */
+ * After the first look, the test makes no more columns than options.test_columns and the frame's
+ * work (EITS_TEST_WORK) allow: each step asks first whether it may (eits_may_make). Where it may
+ * not, the answer so far is reported, and the count is said to be uncertain. */
 #include "evidence/verdict.h"
 
 #include "base/vec.h"
@@ -109,23 +106,21 @@ static void split(eits_context *ctx, const eits_scratch *scratch, const eits_fit
     uint32_t k = likeliest_pair(ctx, v);
     if (k == v->answer.count)
         return;
-    const uint32_t all = ctx->options.test_columns,
-                   most = all == 0 || all > EITS_SPLIT_COLUMNS ? EITS_SPLIT_COLUMNS : all;
     (void)take_errors(ctx, scratch, f, v, v->drift, macs); /* as before */
-    ctx->evidence.columns_most = most;
+    if (ctx->evidence.columns_most > EITS_SPLIT_COLUMNS)
+        ctx->evidence.columns_most = EITS_SPLIT_COLUMNS;
     while (k < v->answer.count && take_split(ctx, scratch, v, k, macs))
         k = likeliest_pair(ctx, v);
 }
 
-/* The number of columns that may be made for a sheet that has not drifted; 0 stands for any number.
- */
-static uint32_t columns_without_drift(const eits_context *ctx, const eits_fit *f)
+/* The most columns that the test may make. */
+static uint32_t columns_of_frame(const eits_context *ctx, const eits_fit *f)
 {
-    const uint32_t all = ctx->options.test_columns,
-                   left = f->moves < EITS_STILL_COLUMNS - EITS_STILL_MIN
-                              ? EITS_STILL_COLUMNS - f->moves
-                              : EITS_STILL_MIN;
-    return all < left ? all : left;
+    const uint64_t work = eits_fit_limit(ctx, EITS_TEST_WORK);
+    const uint32_t all = ctx->options.test_columns, rank = ctx->model->rank,
+                   each = rank * (rank + EITS_COLUMN_ROWS),
+                   left = f->macs < work ? (uint32_t)(work - f->macs) / each : 0;
+    return all > 0 && all < left ? all : left;
 }
 
 /* Leave in v, which has all discs, those that stay. Returns 0 where they cannot be tested. */
@@ -139,8 +134,6 @@ static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, ei
         v->answer.parameters = EITS_PLACE_PARAMETERS;
     ctx->evidence.spent = 0;
     int whole = eits_eliminate(ctx, scratch, v, 0, macs);
-    if (!whole)
-        ctx->evidence.columns_most = ctx->options.test_columns;
     if (eits_fits(ctx, v) || !eits_may_make(ctx, eits_columns_of(&drifted.answer)))
         return 1;
     const int drifts = take_errors(ctx, scratch, f, &drifted, 1, macs);
@@ -157,7 +150,7 @@ static int judge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, ei
 void eits_test_touches(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     ctx->evidence.columns_made = ctx->evidence.spent = 0;
-    ctx->evidence.columns_most = columns_without_drift(ctx, f);
+    ctx->evidence.columns_most = columns_of_frame(ctx, f);
     if (f->count == 0)
         return;
     eits_verdict v = {.changed = 0};

@@ -94,7 +94,6 @@ void eits_joint_give(const eits_context *ctx, const eits_joint *j, eits_fit *f)
 int eits_fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j)
 {
     j->count = 0;
-    ctx->joint.spent = 0;
     eits_pole_forget(ctx);
     if (!may_fit(ctx, f))
         return 0;
@@ -109,7 +108,8 @@ int eits_fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f
     }
     if (fewer == 0)
         eits_joint_guess_kinds(ctx, j);
-    f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, scratch, j);
+    f->macs += eits_joint_metric(ctx);
+    eits_joint_settle(ctx, scratch, j, &f->macs);
     return eits_joint_explains(ctx, j) && eits_joint_take_if_clear(ctx, j, fewer, begun, f);
 }
 
@@ -143,8 +143,8 @@ void eits_fit_jointly(eits_context *ctx, const eits_scratch *scratch, eits_fit *
     if (!same_touches(ctx, f, j)) {
         *j = begin(ctx, f);
         eits_joint_guess_kinds(ctx, j);
-        ctx->joint.spent = f->macs; /* the fit of discs and the test as well */
-        f->macs += eits_joint_metric(ctx) + eits_joint_settle(ctx, scratch, j);
+        f->macs += eits_joint_metric(ctx);
+        eits_joint_settle(ctx, scratch, j, &f->macs);
     }
     if (was_better(ctx, &first, j)) {
         *j = first;

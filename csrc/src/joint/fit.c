@@ -338,9 +338,8 @@ uint64_t eits_joint_return_to(eits_context *ctx, eits_joint *j)
 
 uint64_t eits_joint_limit(const eits_context *ctx, const eits_joint *j, uint64_t most)
 {
-    const uint64_t all = EITS_JOINT_FRAME_WORK - (j->searches ? EITS_JOINT_AGAIN : 0),
-                   spent = ctx->joint.spent, left = spent < all ? all - spent : 0;
-    return most < left ? most : left;
+    const uint64_t all = eits_fit_limit(ctx, j->searches ? EITS_FIRST_WORK : EITS_TOUCH_WORK);
+    return most < all ? most : all;
 }
 
 void eits_joint_descend(eits_context *ctx, eits_joint *j, uint32_t rounds, eits_real hopeless,

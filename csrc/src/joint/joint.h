@@ -78,9 +78,8 @@ eits_real eits_joint_expect(eits_context *ctx, eits_joint *j, uint64_t *macs);
 /* Descend as eits_joint_descend does, from the last evaluation, which must be about *j. */
 void eits_joint_continue(eits_context *ctx, eits_joint *j, eits_real hopeless, uint64_t *macs);
 
-/* Return the limit of multiply-accumulates for settling: the lesser of `most` and of the part of
- * EITS_JOINT_FRAME_WORK that this frame's touches have not spent. Before the test, EITS_JOINT_AGAIN
- * of that part are kept for later. */
+/* Return the limit of this frame's multiply-accumulates for settling: `most`, but at most
+ * EITS_FIRST_WORK before the test and EITS_TOUCH_WORK after it. */
 uint64_t eits_joint_limit(const eits_context *ctx, const eits_joint *j, uint64_t most);
 
 /* After other shapes were tried: make the induced field and the normal equations about *j again,
@@ -175,19 +174,19 @@ int eits_joint_turn(eits_context *ctx, eits_joint *j, uint32_t k, eits_real fall
 void eits_joint_choose_kinds(eits_context *ctx, eits_joint *j, uint64_t settled, uint64_t *macs);
 
 /* settle.c: bring the shapes to the minimum of F, first as discs. They become ellipses if discs
- * leave more than noise and ellipses lower F by enough. Returns the multiply-accumulates. */
-uint64_t eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_joint *j);
+ * leave more than noise and ellipses lower F by enough. `macs` has the work of this frame's touches
+ * so far, in multiply-accumulates, and is increased. */
+void eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
+                       uint64_t *macs);
 
-/* search.c: change the number of discs if they leave more than noise. `spent` is the work of this
- * frame so far, in multiply-accumulates. Returns the additional work. Afterwards the normal
- * equations are those about *j. */
-uint64_t eits_joint_search(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
-                           uint64_t spent);
+/* search.c: change the number of discs if they leave more than noise. `macs` as in
+ * eits_joint_settle. Afterwards the normal equations are those about *j. */
+void eits_joint_search(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
+                       uint64_t *macs);
 
-/* split.c: try long touches as two. `spent` is the work of this frame so far, in
- * multiply-accumulates. Returns the additional work. Afterwards the normal equations are those
- * about *j. */
-uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent);
+/* split.c: try long touches as two. `macs` as in eits_joint_settle. Afterwards the normal equations
+ * are those about *j. */
+void eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t *macs);
 
 /* Return 1 if two shapes count as two touches: they are far enough apart and of similar strength.
  */

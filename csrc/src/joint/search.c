@@ -247,19 +247,18 @@ static int try_strong(eits_context *ctx, eits_joint *j, uint64_t *macs)
     return turned > 0;
 }
 
-uint64_t eits_joint_search(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
-                           uint64_t spent)
+void eits_joint_search(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
+                       uint64_t *macs)
 {
-    const uint64_t begin = spent;
-    j->further = j->most = eits_joint_limit(ctx, j, spent + EITS_JOINT_SEARCH_WORK);
-    while (spent + ctx->joint.evaluated < j->most && try_merged(ctx, j, &spent))
+    j->further = j->most =
+        eits_joint_limit(ctx, j, *macs + eits_fit_limit(ctx, EITS_JOINT_SEARCH_WORK));
+    while (*macs + ctx->joint.evaluated < j->most && try_merged(ctx, j, macs))
         continue;
-    if (leaves_more(ctx, j) && !(goes_on(ctx, j) && try_strong(ctx, j, &spent)))
-        spent += eits_joint_evaluate(ctx, j, 1);
-    while (spent < j->most &&
-           (try_fewer(ctx, j, &spent) ||
-            (goes_on(ctx, j) && spent + SCORED * ctx->joint.evaluated < j->most &&
-             try_more(ctx, scratch, j, &spent))))
+    if (leaves_more(ctx, j) && !(goes_on(ctx, j) && try_strong(ctx, j, macs)))
+        *macs += eits_joint_evaluate(ctx, j, 1);
+    while (*macs < j->most &&
+           (try_fewer(ctx, j, macs) ||
+            (goes_on(ctx, j) && *macs + SCORED * ctx->joint.evaluated < j->most &&
+             try_more(ctx, scratch, j, macs))))
         continue;
-    return spent - begin;
 }

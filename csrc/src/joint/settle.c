@@ -39,7 +39,7 @@ static void try_search(eits_context *ctx, const eits_scratch *scratch, eits_join
 {
     eits_joint found = *discs;
     eits_joint_keep(ctx, j);
-    *macs += eits_joint_search(ctx, scratch, &found, *macs);
+    eits_joint_search(ctx, scratch, &found, macs);
     const eits_real fall = found.count < j->count ? -EITS_JOINT_NEEDED : EITS_JOINT_SPLIT_FALL;
     if (j->cost - found.cost > fall * eits_joint_excess(ctx, &found))
         *j = found;
@@ -47,27 +47,27 @@ static void try_search(eits_context *ctx, const eits_scratch *scratch, eits_join
         eits_joint_back(ctx, j);
 }
 
-uint64_t eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_joint *j)
+void eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
+                       uint64_t *macs)
 {
     const eits_real folds = (eits_real)eits_joint_folds(ctx);
-    uint64_t macs = 0;
-    j->most = eits_joint_limit(ctx, j, EITS_JOINT_WORK);
-    j->further = eits_joint_limit(ctx, j, EITS_JOINT_WORK + (j->searches ? EITS_JOINT_FURTHER : 0));
+    const uint64_t begin = *macs, most = eits_fit_limit(ctx, EITS_JOINT_WORK),
+                   further = j->searches ? eits_fit_limit(ctx, EITS_JOINT_FURTHER) : 0;
+    j->most = eits_joint_limit(ctx, j, begin + most);
+    j->further = eits_joint_limit(ctx, j, begin + most + further);
     eits_pole_clear(ctx, j->count);
     eits_joint_free_all(j);
-    eits_joint_descend(ctx, j, 2, folds + EITS_JOINT_HOPELESS, &macs);
+    eits_joint_descend(ctx, j, 2, folds + EITS_JOINT_HOPELESS, macs);
     j->further = j->most;
     if (j->parameters == EITS_JOINT_DISC) {
         const eits_joint discs = *j;
         if (j->count * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS &&
-            j->misfit > folds + EITS_JOINT_FITS && 3u * macs < j->most)
-            try_ellipses(ctx, j, &macs);
+            j->misfit > folds + EITS_JOINT_FITS && 3u * (*macs - begin) < most)
+            try_ellipses(ctx, j, macs);
         if (may_miss(ctx, j))
-            try_search(ctx, scratch, j, &discs, &macs);
+            try_search(ctx, scratch, j, &discs, macs);
     }
     if (eits_joint_excess(ctx, j) < EITS_JOINT_LOST)
-        macs += eits_joint_split(ctx, j, macs);
-    eits_joint_choose_kinds(ctx, j, macs, &macs);
-    ctx->joint.spent += macs;
-    return macs;
+        eits_joint_split(ctx, j, macs);
+    eits_joint_choose_kinds(ctx, j, *macs - begin, macs);
 }

@@ -186,13 +186,13 @@ static int may_split(const eits_context *ctx, const eits_joint *j)
            (j->count + 1u) * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS;
 }
 
-uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent)
+void eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t *macs)
 {
-    const uint64_t begin = spent;
     uint8_t tried[EITS_MAX_TOUCHES] = {0};
     uint32_t tries = 0, taken = 0, rounds = 1;
-    j->further = j->most = eits_joint_limit(ctx, j, spent + EITS_JOINT_SPLIT_WORK);
-    while (may_split(ctx, j) && tries < EITS_JOINT_SPLIT_TRIES + taken && spent < j->most) {
+    j->further = j->most =
+        eits_joint_limit(ctx, j, *macs + eits_fit_limit(ctx, EITS_JOINT_SPLIT_WORK));
+    while (may_split(ctx, j) && tries < EITS_JOINT_SPLIT_TRIES + taken && *macs < j->most) {
         const uint32_t k = longest(j, tried);
         if (k == j->count)
             break;
@@ -202,19 +202,17 @@ uint64_t eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t spent)
         if (tries++ == 0)
             eits_joint_keep(ctx, j);
         eits_joint_free_one(j, k);
-        spent += eits_joint_hold(ctx, j, rounds);
+        *macs += eits_joint_hold(ctx, j, rounds);
         rounds = 0;
-        if (eits_joint_turn(ctx, j, k, EITS_JOINT_SHAPE_FALL, &spent) ||
-            try_two(ctx, j, k, &spent)) {
+        if (eits_joint_turn(ctx, j, k, EITS_JOINT_SHAPE_FALL, macs) || try_two(ctx, j, k, macs)) {
             ++taken;
             rounds = 1;
         } else
-            spent += eits_joint_restore(ctx, j, k);
+            *macs += eits_joint_restore(ctx, j, k);
     }
     eits_joint_free_all(j);
     if (taken > 0)
-        eits_joint_descend(ctx, j, 1, R(INFINITY), &spent);
+        eits_joint_descend(ctx, j, 1, R(INFINITY), macs);
     else if (tries > 0)
         eits_joint_back(ctx, j);
-    return spent - begin;
 }

@@ -147,6 +147,18 @@ static eits_real squared_residual(const eits_context *ctx, const eits_scratch *s
     return eits_dot(ctx->kernels, difference, difference, rank);
 }
 
+uint64_t eits_fit_limit(const eits_context *ctx, uint32_t per_fold)
+{
+    const uint32_t folds = ctx->model->n_folded;
+    return (uint64_t)per_fold * (folds > EITS_LEAST_FOLDS ? folds : EITS_LEAST_FOLDS);
+}
+
+int eits_fit_may_go_on(const eits_context *ctx, eits_fit *f)
+{
+    f->cut |= f->macs >= eits_fit_limit(ctx, EITS_FIT_WORK);
+    return !f->cut;
+}
+
 /* One damped Gauss-Newton step of one disc, others held; halved up to twice until the residual
  * falls. Returns how far it went, mm. f->residual is what all discs leave, before and
  * after. */
@@ -157,7 +169,6 @@ static eits_real move_disc(eits_context *ctx, const eits_scratch *scratch, eits_
     eits_disc *disc = &f->disc[k];
     eits_real *atom = eits_atom(ctx, k), *trial_atom = scratch->row[2], *left = scratch->row[3],
               *target = f->residual;
-    ++f->moves;
     eits_axpy(ctx->kernels, target, disc->change, atom, rank);
     f->macs += eits_disc_shape(ctx, scratch, disc, NULL, &scratch->row[5], NULL);
     disc->change = eits_best_change(ctx, disc, atom, target);
@@ -229,6 +240,8 @@ void eits_fit_move(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, 
     for (uint32_t sweep = 0; sweep < sweeps; ++sweep) {
         eits_real farthest = 0;
         for (uint32_t k = first; k <= last; ++k) {
+            if (!eits_fit_may_go_on(ctx, f))
+                return;
             const eits_real moved = move_disc(ctx, scratch, f, k);
             farthest = eits_larger(moved, farthest);
         }

@@ -50,8 +50,8 @@ typedef struct eits_fit {
     /* options.touch_radius_weight, times a factor of the present stage of the touch fit */
     eits_real radius_weight;
     uint32_t count;
-    uint32_t moves; /* steps of single discs so far */
-    uint64_t macs;
+    uint32_t cut;  /* 1: steps were left out because of EITS_FIT_WORK */
+    uint64_t macs; /* multiply-accumulates of this frame's touches so far */
 } eits_fit;
 
 /* Return the k-th disc's answer to 1 S/m: stride numbers. */
@@ -59,6 +59,13 @@ static inline eits_real *eits_atom(const eits_context *ctx, uint32_t k)
 {
     return ctx->touch.atoms + EITS_STRIDE(ctx->model->rank) * k;
 }
+
+/* Return a limit of f->macs: `per_fold` multiply-accumulates for each fold of the model, and for at
+ * least EITS_LEAST_FOLDS folds. */
+uint64_t eits_fit_limit(const eits_context *ctx, uint32_t per_fold);
+
+/* Return 1 if the fit of discs may begin another step; otherwise set f->cut. */
+int eits_fit_may_go_on(const eits_context *ctx, eits_fit *f);
 
 /* disc_fit.c */
 
@@ -89,7 +96,7 @@ eits_real eits_best_change(const eits_context *ctx, const eits_disc *disc, const
 eits_real eits_expected_radius(const eits_options *o, const eits_disc *disc);
 
 /* Make up to `sweeps` sweeps of Gauss-Newton steps over the discs `first` to `last`, both included,
- * until they settle. */
+ * until they settle. No step begins after EITS_FIT_WORK. */
 void eits_fit_move(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, uint32_t first,
                    uint32_t last, uint32_t sweeps);
 void eits_fit_move_all(eits_context *ctx, const eits_scratch *scratch, eits_fit *f,
@@ -104,8 +111,8 @@ void eits_fit_explain(eits_context *ctx, eits_fit *f);
  * other discs are fitted again each time. */
 void eits_fit_prune(eits_context *ctx, const eits_scratch *scratch, eits_fit *f);
 
-/* split_merge.c: no merge is tried once the fit has made EITS_MERGE_MOVES steps, and no split
- * after EITS_SPLIT_MOVES */
+/* split_merge.c: no merge is tried once the frame's work has reached EITS_FIT_WORK, and no split
+ * after EITS_SPLIT_WORK */
 
 /* Merge overlapping or nearly touching discs if one disc explains as much. Returns 1 if any were
  * merged. */

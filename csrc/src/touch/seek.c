@@ -81,7 +81,7 @@ static void add(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 static int exchange(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     int any = 0;
-    for (uint32_t k = 0; k < f->count; ++k) {
+    for (uint32_t k = 0; k < f->count && eits_fit_may_go_on(ctx, f); ++k) {
         const eits_fit_kept before = eits_fit_keep(ctx, f);
         --f->count;
         for (uint32_t l = k; l < f->count; ++l)
@@ -112,7 +112,7 @@ void eits_fit_seek(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
 {
     f->count = 0;
     eits_fit_restart(ctx, scratch, f);
-    while (f->count < ctx->options.max_touches) {
+    while (f->count < ctx->options.max_touches && eits_fit_may_go_on(ctx, f)) {
         const eits_fit_kept before = eits_fit_keep(ctx, f);
         add(ctx, scratch, f);
         for (int round = 0;

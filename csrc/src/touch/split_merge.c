@@ -11,9 +11,9 @@
  * Limits are parts of |y|^2, of what is left, and of what noise gives one direction
  * (f->noise / rank): the first guards against the model's own error, which scales with the touch,
  * the last against noise. A trial costs a few moves of disc_fit.c; the search is greedy, nearest
- * pair and largest disc first, since trying all subsets would grow without bound. Once the fit has
- * made EITS_SPLIT_MOVES no disc is tried as two, and after EITS_MERGE_MOVES no two as one: the
- * discs go to the test of touches. */
+ * pair and largest disc first, since trying all subsets would grow without bound. Once the frame's
+ * work has reached EITS_SPLIT_WORK no disc is tried as two, and after EITS_FIT_WORK no two as one:
+ * the discs go to the test of touches. */
 #include "touch/constants.h"
 #include "touch/disc_fit.h"
 
@@ -120,7 +120,7 @@ int eits_fit_merge(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
     int any = 0;
     pair next, last;
     const pair *after = NULL;
-    while (f->moves < EITS_MERGE_MOVES && next_pair(f, after, &next)) {
+    while (next_pair(f, after, &next) && eits_fit_may_go_on(ctx, f)) {
         if (try_merge(ctx, scratch, f, &next)) {
             any = 1;
             after = NULL;
@@ -270,8 +270,8 @@ int eits_fit_split(eits_context *ctx, const eits_scratch *scratch, eits_fit *f)
     /* those that come by splitting are not split again at once */
     const uint32_t before = f->count;
     for (uint32_t turn = 0; turn < before; ++turn) {
-        if (f->count >= ctx->options.max_touches || f->moves >= EITS_SPLIT_MOVES ||
-            eits_fit_left(ctx, f) < enough)
+        if (f->count >= ctx->options.max_touches ||
+            f->macs >= eits_fit_limit(ctx, EITS_SPLIT_WORK) || eits_fit_left(ctx, f) < enough)
             return any;
         uint32_t k = before;
         for (uint32_t i = 0; i < before; ++i) { /* the largest first */

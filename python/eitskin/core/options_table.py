@@ -96,7 +96,7 @@ class OptionFields:
     touch_test: bool = True
     # the most columns that the touch test may compute per frame (about 6 kMAC each at rank 64)
     # after a first look at each touch. When they are used up, the touches found so far are reported
-    # as crowded; 0: no limit
+    # as crowded; 0: no limit but the frame's budget (TEST_WORK)
     test_columns: int = 200
     # the noise of a row is at least this, V; for a converter, its step over the square root of 12
     noise_floor_v: float = 0.0

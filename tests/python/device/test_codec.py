@@ -1,4 +1,5 @@
-"""The codec through cffi: sent packets arrive, damaged ones do not, and every byte is counted."""
+"""The codec through cffi: what is sent arrives, what is damaged does not, and every byte is
+accounted for."""
 
 import pytest
 from hypothesis import given, settings

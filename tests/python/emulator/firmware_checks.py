@@ -33,8 +33,7 @@ EXCITATION_HZ, SETTLE_US = 50_000.0, 16
 
 @dataclass
 class Session:
-    """A board that has scanned a few frames of a touched skin without noise, and the packets that
-    it sent."""
+    """A board that has scanned a few frames of a touched skin without noise, and what it said."""
 
     board: EmulatedBoard
     protocol: Protocol
@@ -179,7 +178,7 @@ def settled(session: Session) -> str | None:
 
 
 def interrupts(session: Session) -> str | None:
-    """There is one interrupt per burst: none is lost, and none comes twice."""
+    """One interrupt a burst: none is lost, none comes twice."""
     board = session.board
     taken, bursts = board.record.interrupts[16 + 56], board.adc.conversions / 80
     return (

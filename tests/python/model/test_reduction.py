@@ -1,4 +1,5 @@
-"""The reduction, compared with its definition: folds, whitening and the greatest eigenvalue."""
+"""The reduction against its own definition: what folds, what whitens, and what the greatest
+eigenvalue is."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,4 @@
-"""The reconstructor as users see it: its refusals, the errors after which it still works, and its
-messages."""
+"""The reconstructor as users see it: what it refuses, what it survives, and what it says of it."""
 
 from dataclasses import replace
 
