@@ -49,9 +49,8 @@ function(eitskin_add_core name)
     set_target_properties(${name} PROPERTIES C_VISIBILITY_PRESET hidden)
     if(CORE_DOUBLE)
         target_compile_definitions(${name} PUBLIC EITS_DOUBLE)
-        if(EITSKIN_PYTHON) # only what compares with it waits for it; -O3 takes a third more room
-            target_compile_options(${name} PRIVATE -O2)
-        endif()
+        # only what compares with it waits for it; -O3 takes a third more room and a quarter more time to compile
+        target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O2>)
     endif()
     if(EITSKIN_AVX2)
         target_sources(${name} PRIVATE ${root}/src/kernels/avx2.c)

@@ -57,8 +57,9 @@ def goes_on(
 def fills_its_page(
     outcome: ExperimentOutcome, name: str, folder: Path, but: tuple[str, ...] = ()
 ) -> str:
-    """Tables are whole, and pictures are drawn, ``but`` for some. A copy of the page takes the
-    outcome, all of its marks are of it, and it shows every picture; returns what it says then."""
+    """Check that tables are complete and that pictures are drawn, except those in ``but``. A copy
+    of the page is filled with the outcome: every mark must be filled, and every picture shown.
+    Returns the text of the page."""
     for table in outcome.tables:
         assert table.rows and all(len(row) == len(table.head) for row in table.rows)
     for picture in outcome.pictures.keys() - set(but):

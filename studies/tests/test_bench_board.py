@@ -1,4 +1,4 @@
-"""``eitskin bench board``: its numbers are those of the runs, its page says what they are."""
+"""``eitskin bench board``: its numbers are those of the runs, and its page describes them."""
 
 import json
 from pathlib import Path

@@ -1,5 +1,5 @@
-"""``eitskin bench diagnostics``: what is counted agrees with the frames, and the page says what the
-command wrote."""
+"""``eitskin bench diagnostics``: its counts agree with the frames, and its page has the text that
+the command wrote."""
 
 import json
 import re

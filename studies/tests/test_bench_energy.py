@@ -1,4 +1,4 @@
-"""Energy a frame: what is summed, and that the page says so."""
+"""Energy per frame: the sum of the parts, and the sentences of the page."""
 
 import json
 

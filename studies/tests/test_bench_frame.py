@@ -1,5 +1,5 @@
-"""The benchmark of a frame: every engine and peer is run, on the same frames, and what it says of
-them adds up."""
+"""The benchmark of a frame: every engine and other program runs on the same frames, and the numbers
+in its report are consistent."""
 
 import numpy as np
 import pytest

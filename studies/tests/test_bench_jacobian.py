@@ -1,4 +1,4 @@
-"""The Jacobian benchmark: that both sides compute the same thing, and what it says where pyEIT is
+"""The Jacobian benchmark: both sides compute the same, and a message is printed if pyEIT is
 absent."""
 
 import importlib.util

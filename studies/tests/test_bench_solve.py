@@ -9,7 +9,10 @@ from eitskin.scene.random_touches import random_touches
 from eitskin.scene.simulate import Measurement, simulate
 from eitskin_studies.benchmarks import solve as bench_solve
 from eitskin_studies.benchmarks import solve_peers as bench_solve_peers
+from eitskin_studies.benchmarks import suboptimality
 from eitskin_studies.benchmarks.solve_problems import Problems, make_problems
+from eitskin_studies.harness.sections import fill_marks
+from study_pages import page_copy
 
 OWN = {f"eitskin {solver}, {width}" for solver in SOLVERS for width in ("float32", "float64")}
 
@@ -59,3 +62,15 @@ def test_what_is_absent_is_named():
         "tables": [],
     }
     assert "not installed: celer; run  pip install celer" in bench_solve.text(result)
+
+
+def test_the_page_has_the_last_stop_of_each_solver(tmp_path):
+    stops = [
+        suboptimality.StopPoint(solver, effort, 0.026, 0.862, 0.729, 586_400.0, 0.2)
+        for solver, effort in (("fista", 60), ("working-set", 60), ("active-set", 0))
+    ]
+    filling = suboptimality.for_page(suboptimality.GapCurves(tuple(stops), "some", "others"), "x")
+    page = page_copy(tmp_path, "benchmarks")
+    fill_marks(page, "benchmarks", filling)
+    text = page.read_text(encoding="utf-8")
+    assert "| active set, to the optimum | 586 k | 2.6e-02 | .862 | .729 |" in text

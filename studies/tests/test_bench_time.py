@@ -1,4 +1,4 @@
-"""A frame's time as a range: what the table and the sentence say of two bounds."""
+"""A frame's time as a range: the table and the sentence about two bounds."""
 
 from eitskin_studies.benchmarks.time_range import BoundedFrame, TimeRange, for_page, table
 from study_pages import page_copy

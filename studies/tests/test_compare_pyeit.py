@@ -1,4 +1,4 @@
-"""pyEIT's own solvers beside the others: each puts a small touch where it is."""
+"""pyEIT's own solvers in the comparison: each puts a small touch at its place."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Configurations: what a set may say, and what the built-in one holds."""
+"""Sets of configurations: their valid keys and values, and the built-in set."""
 
 from dataclasses import replace
 

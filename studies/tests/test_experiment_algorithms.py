@@ -1,5 +1,5 @@
-"""The experiment ``algorithms``: what it finds on a few scenes, that it goes on where it was cut,
-and its page's marks."""
+"""The experiment ``algorithms``: its results on a few scenes, continuing after an interruption, and
+its page's marks."""
 
 from dataclasses import replace
 from pathlib import Path

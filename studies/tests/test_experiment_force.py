@@ -1,5 +1,5 @@
-"""The force study, small: what it keeps it does not compute again, seeds tell it, and its physics
-holds."""
+"""The force study on few scenes: kept results are not computed again, each seed has results of its
+own, and its physics is right."""
 
 import json
 from pathlib import Path

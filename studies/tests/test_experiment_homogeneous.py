@@ -1,5 +1,5 @@
-"""The experiment ``homogeneous``: the fold, the measures, what each effect does to them, and what
-the doctor says."""
+"""The experiment ``homogeneous``: the fold, the measures, the influence of each effect on them, and
+the doctor's findings."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
-"""The levers: what each search and each image is worth, on few scenes; and that a run goes on where
-it was."""
+"""The levers: the gain of each search and each image, on few scenes; and continuing an interrupted
+run."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
-"""The experiment on many touches: its scenes, its numbers, its doubt, and that a run goes on where
-it was."""
+"""The experiment on many touches: its scenes, its numbers, how it reports uncertainty, and
+continuing an interrupted run."""
 
 import math
 from pathlib import Path

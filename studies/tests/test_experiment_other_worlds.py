@@ -1,5 +1,5 @@
-"""The study of other worlds: every set is scored, the worst first, and a run goes on where it
-was."""
+"""The study of other worlds: every set is scored, the worst come first, and an interrupted run
+continues."""
 
 from functools import partial
 from pathlib import Path

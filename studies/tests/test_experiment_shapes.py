@@ -1,5 +1,5 @@
-"""The experiment on shapes: what is drawn, what is measured once, and what a finger with one
-electrode cannot show."""
+"""The experiment on shapes: its pictures, measurements that are made once, and a finger with one
+electrode, which shows nothing."""
 
 import math
 from pathlib import Path

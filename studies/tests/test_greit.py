@@ -1,5 +1,5 @@
-"""The GREIT-like matrix: what it is trained for, what it minimises, and that it sees a small target
-where it is."""
+"""The GREIT-like matrix: its training, the cost that it minimises, and a small target, which it
+shows at its place."""
 
 import numpy as np
 import pytest

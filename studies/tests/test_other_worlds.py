@@ -1,5 +1,5 @@
-"""Sets of other worlds: what is drawn is what the names say, families share nothing, and the score
-counts."""
+"""Sets of other worlds: scenes are drawn as their names say, families share no scenes, and scores
+are right."""
 
 import json
 import math

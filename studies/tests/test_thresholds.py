@@ -54,7 +54,8 @@ def test_nearest_curve_is_the_pixel_mask_spread_over_cells():
 
 
 def test_a_perfect_image_is_limited_by_its_pixels_only():
-    """The ceiling that a 32-pixel image has, and none where pixels are cells."""
+    """A perfect image of 32 pixels has an MIoU below 1; if pixels are cells of the raster, it has
+    1."""
     outline = disk(194.0)
     grid = grid_for(outline)
     raster = metrics.raster_inside(outline)

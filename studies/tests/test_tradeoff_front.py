@@ -1,5 +1,5 @@
-"""The Pareto front of made-up points; what the recorded results must show, and what ships of
-them."""
+"""The Pareto front of made-up points; requirements on the recorded results, and the part of them in
+the package."""
 
 import json
 from pathlib import Path

@@ -1,5 +1,5 @@
-"""The measurement on tiny sets: what it measures, that it goes on after a kill, and that frames are
-what they are said to be."""
+"""The measurement of the trade-off on tiny sets: its numbers, continuing after a kill, and frames
+that have the stated properties."""
 
 import json
 from dataclasses import replace

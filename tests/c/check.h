@@ -68,9 +68,10 @@ static inline void check_equal(long long got, long long want, const char *file, 
 #define CHECK_OK(call)      CHECK_EQUAL(call, EITS_OK)
 #define CHECK_REFUSED(call) CHECK_EQUAL(call, EITS_E_ARGUMENT)
 
-/* From here on failures say this of their case, until another or the test's end. EACH_ROW goes
- * through a table whose rows begin with a name, and failures say the row's; a loop over other
- * tables, for (size_t k = 0; IN_TABLE(k, cases); ++k), says the row's number. */
+/* Names the case of the failures from here on, until another CASE or the end of the test. EACH_ROW
+ * goes through a table whose rows begin with a name, and failures show the name of the row. With a
+ * loop over another table, for (size_t k = 0; IN_TABLE(k, cases); ++k), they show the number of
+ * the row. */
 #define CASE(name)     (checks_case = (name))
 #define COUNT_OF(list) (sizeof(list) / sizeof(list)[0])
 #define EACH_ROW(row, rows)                         \

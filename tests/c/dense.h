@@ -50,8 +50,8 @@ double dense_greatest_difference(const double *a, const eits_real *b, size_t cou
 double *dense_numbers(size_t count);
 double *dense_copy(const eits_real *a, size_t count);
 
-/* A small model, a context on it, and the model in doubles: what most tests of a solve stand on.
- * Opening it closes what was open, so it is static, or zero before the first time. */
+/* A small model, a context on it, and the model in doubles: the basis of most tests of a solve.
+ * Opening it closes one that was open, so it is static, or zero before the first time. */
 typedef struct dense_bench {
     small_model made;
     small_context c;

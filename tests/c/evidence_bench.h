@@ -1,5 +1,5 @@
-/* A small model that says what it may be wrong by, and frames with the data of discs: for tests of
- * the test of touches. */
+/* A small model with model errors, and frames with the data of discs: for tests of the touch test.
+ * */
 #ifndef EITSKIN_TEST_EVIDENCE_BENCH_H
 #define EITSKIN_TEST_EVIDENCE_BENCH_H
 

@@ -260,7 +260,8 @@ static double product_of_rows(const uint8_t *redu, uint32_t stride, uint32_t i, 
     return sum;
 }
 
-/* How P and S were whitened, as the builder says it; 0 where they have another form. */
+/* Writes into the section WHIT how P and S were whitened, as the builder states it; returns 0 if
+ * they have another form. */
 static int fill_row_form(const small_spec *spec, const double *s, uint32_t n, uint32_t stride,
                          const uint8_t *redu, uint8_t *whit)
 {

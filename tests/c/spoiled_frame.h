@@ -1,5 +1,4 @@
-/* A small skin with reference frames, and what its rows use: for tests of what is found wrong with
- * a frame. */
+/* A small skin with reference frames, and the rows of its electrodes: for tests of diagnostics. */
 #ifndef EITSKIN_TEST_SPOILED_FRAME_H
 #define EITSKIN_TEST_SPOILED_FRAME_H
 #include "steps.h"

@@ -6,7 +6,8 @@ static dense_bench b;
 /* The size is a constant expression: this compiles only if it is. */
 static uint8_t constant[EITS_WORKSPACE_SIZE(40, 21, 12, 36, 36, 0, 1)];
 
-/* The workspace of a model is as large as the macro says, and ends where its last array ends. */
+/* The workspace of a model has the size that the macro gives, and ends where its last array ends.
+ * */
 static void check_size(small_spec spec, int prepared)
 {
     small_model made = small_model_make(spec);

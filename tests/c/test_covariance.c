@@ -284,8 +284,8 @@ TEST(shapes_move_the_data_as_ellipses_do)
                1000 * EPS * sqrt(dense_dot(left, left, RANK)));
 }
 
-/* Eight parameters a disc where there is room, then four, then none; dipoles where there are fields
- * and room to keep a disc's. */
+/* A disc has eight parameters if there is room, otherwise four, otherwise none; it has dipoles if
+ * the model has fields and if there is room for its dipoles. */
 TEST(parameters_fit_the_data)
 {
     eits_context *ctx = set_up(&b, 0);

@@ -73,8 +73,8 @@ TEST(every_limit_beside_columns_that_depend)
     }
 }
 
-/* A start whose great coefficients cancel, on columns that are alike: without those that depend it
- * is far worse than zero. */
+/* A start with large coefficients that cancel, on columns that are nearly equal. Without the
+ * dependent ones it is far worse than zero. */
 TEST(starts_that_cancel)
 {
     eits_context *ctx = set_up(&b, 0);

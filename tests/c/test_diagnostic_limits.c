@@ -1,5 +1,5 @@
-/* What is said of a frame that is imaged as it is - mismatch, a stale reference, crowds - and which
- * readings of reference frames are odd: from numbers set by hand, on both sides of each limit. */
+/* Diagnostics that do not mask rows (mismatch, stale reference, crowded), and outliers of
+ * reference frames: from numbers that are set by hand, on both sides of each limit. */
 #include "steps.h"
 
 #include "diagnostics/diagnostics.h"
@@ -180,7 +180,8 @@ TEST(a_frame_of_another_scale_than_the_reference_is_named)
 
 /* ---- mismatch ---- */
 
-/* d = what a sheet gives, and `off` times what none gives; 1 where it is judged a mismatch. */
+/* d = data that a sheet can give, plus `off` times data that no sheet gives; 1 if this is called a
+ * mismatch. */
 static int model_mismatch(eits_context *ctx, double off)
 {
     const double pi = 3.14159265358979323846;
@@ -333,8 +334,7 @@ TEST(rows_out_of_use)
 
 /* ---- noise that is learned ---- */
 
-/* The noise of voltages of any size, whose squares are out of range; and what lambda makes of it.
- */
+/* The noise of voltages whose squares are out of range, and lambda of this noise. */
 TEST(noise_of_any_size)
 {
     static const double sizes[] = {1, BOTH_WIDTHS(1e-24, 1e-170), BOTH_WIDTHS(1e24, 1e170)};

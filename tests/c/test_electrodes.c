@@ -54,8 +54,9 @@ TEST(open_electrodes_are_named_and_left_out)
     }
 }
 
-/* No current by way of it, and it floats where it is measured, not far enough from the reference
- * for reciprocals to tell: open all the same. Rows without a number say nothing of a current. */
+/* No current passes through the electrode, and it floats when it is measured, at voltages near the
+ * reference, so that reciprocals do not show it. It is named open nevertheless. Rows without a
+ * number do not count as rows without current. */
 TEST(an_open_electrode_that_floats)
 {
     for (int missing = 0; missing < 2; ++missing) {
@@ -105,9 +106,10 @@ TEST(noise_alone)
     }
 }
 
-/* Dead below 2 % of the reference or 5 times the noise; a row whose reference is small says nothing
- * either way. Electrode 6 has the dead rows; those that it shares with electrode 2 have the
- * reference `shared`, where others have 1, and stay as they are where that is small. */
+/* A row is dead below 2 % of its reference or below 5 times the noise; a row whose reference is
+ * small counts neither as dead nor as alive. Electrode 6 has the dead rows. The rows that it
+ * shares with electrode 2 have the reference `shared`, all others have 1; if `shared` is small,
+ * these rows stay as they are. */
 TEST(what_a_dead_row_is)
 {
     static const struct {

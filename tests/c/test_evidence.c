@@ -1,5 +1,5 @@
-/* The test of touches: its linearisation and what that says of a disc left out, against dense
- * problems solved again; which discs go and which stay. */
+/* The touch test: its linearisation, and the gain of each disc that is left out, compared with
+ * dense problems that are solved again; which discs are dropped and which stay. */
 #include "evidence_bench.h"
 
 enum { MOST = 24 };
@@ -83,9 +83,9 @@ static double least_without(const square *q, const eits_answer *answer, const in
     return least;
 }
 
-/* Three discs of four parameters and two of eight: the step is where F is least, its matrix's
- * inverse is that, and leaving discs out, one after another, gives what solving again without them
- * gives. */
+/* Three discs of four parameters and two of eight: the step leads to the minimum of F, the matrix
+ * is the inverse there, and leaving out one disc after another gives the same as solving again
+ * without them. */
 TEST(leaving_out_is_solving_again_without)
 {
     static const eits_disc third = {2, 19, 11, R(0.01), 1};
@@ -252,8 +252,8 @@ static void check_what_stays(eits_context *ctx, const eits_fit *f)
     }
 }
 
-/* The same two discs: where nothing is wrong with the model both are touches, and stay bit for bit;
- * where it errs in just the way of the weaker one, that goes. */
+/* The same two discs. If the model has no errors, both are touches and keep their bits. If its
+ * errors look exactly like the weaker one, that disc is dropped. */
 TEST(what_model_errors_could_have_made_goes)
 {
     for (int errs = 0; errs < 2; ++errs) {
@@ -312,9 +312,9 @@ TEST(halves_of_a_touch_become_one)
     CHECK_NEAR(f.disc[0].y_mm, ONE.y_mm, 1.5);
 }
 
-/* Data that no discs explain and a drift of the sheet does: the discs that were found in it go, the
- * true one stays; where the sheet cannot drift so, the data fit badly, and a touch is worth less.
- */
+/* Data that a drift of the sheet explains and discs do not: the discs that were found in them are
+ * dropped, and the true one stays. If the sheet cannot drift so, the data fit badly, and a touch
+ * has less confidence. */
 TEST(discs_found_in_a_drift_go)
 {
     eits_real rise[2];
@@ -418,9 +418,9 @@ TEST(zeros_and_nan_come_to_an_end)
     }
 }
 
-/* Two touches, and up to three discs beside them at random, under errors of several sizes: what
- * stays is some of it, the two among it where the model is not wrong by much; on an instrument that
- * is far from the model one stays whatever its errors could have made. */
+/* Two touches and up to three further discs at random, with errors of several sizes: some discs
+ * stay, and both touches if the model's errors are not large. On an instrument that is far from
+ * the model one disc stays, whatever its errors could have caused. */
 TEST(ghosts_beside_touches_go)
 {
     uint64_t state = 41;
@@ -457,9 +457,9 @@ TEST(ghosts_beside_touches_go)
     }
 }
 
-/* Beyond a first look no more columns are made than options.test_columns, whatever it is; what is
- * reported then is known as after a whole test, and a count is said to be uncertain where a step
- * was left out, and only there. */
+/* After a first look at each touch, at most options.test_columns columns are computed. The
+ * reported touches have the same numbers as after a complete test, and the count is called
+ * uncertain if, and only if, a step was left out. */
 TEST(no_more_columns_are_made_than_allowed)
 {
     int cut = 0, whole = 0;
@@ -503,8 +503,8 @@ TEST(no_more_columns_are_made_than_allowed)
     CHECK(cut > 20 && whole > 5);
 }
 
-/* One wide disc for two at random, side by side: where two are found they lie by the true ones. One
- * for one stays one; so does what is as many as may be. */
+/* One wide disc stands for two random discs side by side. If two are found, they lie near the true
+ * ones. One disc for one stays one; so do as many discs as are allowed. */
 TEST(two_side_by_side_are_split)
 {
     uint64_t state = 5;

@@ -1,5 +1,5 @@
-/* The fast path on drives made by a sum of its own: touches that come, move, change and go, what
- * else rows may do, frames beside them, and what is refused. */
+/* The fast path, with drives that a formula of the test makes: touches that land, move, change and
+ * lift; faulty rows; frames beside the drives; refused calls. */
 #include "steps.h"
 
 #include "base/half.h"
@@ -539,8 +539,8 @@ TEST(test_one_frame_decides)
     }
 }
 
-/* Drives come while a frame is solved: what is found in it is where touches were then, and says
- * nothing of one that came since. */
+/* Drives arrive while a frame is solved. The touches of the frame are at earlier places, and the
+ * frame cannot have touches that landed since. */
 TEST(test_touches_that_move_on)
 {
     bench *b = bench_open(EITS_SIGN_INCREASE);
@@ -720,7 +720,7 @@ TEST(test_fingers_land_one_after_another_and_lift)
     b->on[0] = b->on[1];
     b->fingers = 1;
     drives(b, 4);
-    check_reported(b, 0.3); /* what stays is where it was */
+    check_reported(b, 0.3); /* touches that stay have not moved */
     CHECK_EQUAL(reported(b, touch), 1);
     CHECK_EQUAL(touch[0].id, 2);
     drives(b, EITS_FAST_GONE + 12);

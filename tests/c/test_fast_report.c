@@ -166,8 +166,8 @@ TEST(a_touch_beside_those_of_drives)
     CHECK_EQUAL(report(&clear, 1), 0);
 }
 
-/* All touches have one sequence of ids: what drives give birth to follows what frames have named.
- */
+/* All touches have one sequence of ids: touches that drives start continue after those of frames.
+ * */
 TEST(ids_are_one_sequence)
 {
     const eits_real here[2] = {0, 0}, there[2] = {40, 0};
@@ -320,8 +320,8 @@ TEST(reach)
     CHECK(t[0].id == 5 && t[1].id == 6);
 }
 
-/* A clear touch that is lifted is gone at once, though its id is kept for two frames; a faint one
- * that is well known is reported meanwhile, where it was. */
+/* A clear touch that is lifted ends at once, although its id is kept for two frames. A faint touch
+ * that is well known is reported in these frames, at its last place. */
 TEST(touches_end)
 {
     set_up();

@@ -1,5 +1,5 @@
-/* The section LOAD: what it says of a touch, by hand in double, and everything that a reader
- * refuses. */
+/* The section LOAD: the force of a touch, compared with a computation in double, and the values
+ * that a reader rejects. */
 #include "steps.h"
 
 static const small_spec TINY = {.rank = 3, .side = 3};

@@ -355,7 +355,7 @@ TEST(a_held_touch_and_a_lost_frame_do_not_end_a_hold)
     finger(1, 5, 5, 0, 0, 8);
     frame(&held, 1);
     REPORTS("down");
-    CHECK_EQUAL(b.moves, 0); /* where the tracker holds it says nothing of where it is */
+    CHECK_EQUAL(b.moves, 0); /* while the tracker holds the touch, its place is not known */
     finger(1, 5, 5, 0, 0, 7);
     none(1); /* more than a tap was: nothing is reported of the false lift but up */
     finger(1, 5, 5, 0, 0, 12);

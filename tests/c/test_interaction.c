@@ -152,7 +152,7 @@ TEST(as_computed_densely)
     }
 }
 
-/* Products counted one by one: fields over covers, what bends them, what answers, P of the folds in
+/* The products, counted one by one: fields over covers, non-linearity, answers, P of the folds in
  * use, two norms. */
 TEST(work_is_counted)
 {

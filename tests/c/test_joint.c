@@ -152,8 +152,9 @@ static int unchanged(const eits_fit *f, const eits_fit *before)
 
 /* ---- what comes back ---- */
 
-/* They start 2.2 mm away. Noise and the error that the metric allows the model leave .1 mm of one
- * or two touches, and .6 mm of three, whose 12 parameters take most of what 20 rows tell. */
+/* The touches start 2.2 mm away. Noise, and the error of the model that the metric allows, leave
+ * .1 mm of one or two touches, and .6 mm of three, because 20 rows hardly determine their 12
+ * parameters. */
 TEST(discs_come_back_with_place_radius_and_strength)
 {
     static const double most_mm[] = {0.15, 0.15, 0.75};

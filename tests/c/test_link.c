@@ -1,4 +1,4 @@
-/* The link's codec: what is encoded is decoded, and nothing else is ever taken for a packet. */
+/* The link's codec: encoded packets are decoded, and nothing else is taken for a packet. */
 #include "check.h"
 #include "small_model.h"
 

@@ -138,8 +138,8 @@ TEST(beside_step_halvings)
     }
 }
 
-/* A frame's own multiply-accumulates are always spent; what is left of the limit is the solver's:
- * also where rows are left out, and each column costs a whitening. */
+/* The multiply-accumulates of the frame stage are always spent, and the solver gets the rest of
+ * the limit. This also holds if rows are left out, and each column must be whitened. */
 static void of_a_whole_frame(int masked)
 {
     for (int solver = 0; solver < SOLVERS; ++solver) {

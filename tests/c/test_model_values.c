@@ -119,7 +119,7 @@ TEST(dimensions)
             CHECK_EQUAL(with_word(TINY, "DIMS", fields[f].at, fields[f].wrong[i]),
                         EITS_E_MODEL_VALUE);
     }
-    /* in range, but not what the sections' sizes say */
+    /* in range, but different from what the sizes of the sections imply */
     CHECK_EQUAL(with_word(TINY, "DIMS", 4, 41), EITS_E_MODEL_SECTION);
     CHECK_EQUAL(with_word(TINY, "DIMS", 8, 20), EITS_E_MODEL_SECTION);
     CHECK_EQUAL(with_word(TINY, "DIMS", 20, 8), EITS_E_MODEL_SECTION);

@@ -584,9 +584,9 @@ TEST(a_touch_alone_meets_its_own_image_alone)
     CHECK_NEAR(with_none, alone, 1e-6 * alone);
 }
 
-/* Driven and measured pairs exchanged: the sum of the touches' answers differs by .6 % of what is
- * induced, after one round as after six. That is what halves make of the mirror, and what orders
- * would add that are not sent. */
+/* If driving and measuring pairs are exchanged, the sum of the touches' answers differs by .6 % of
+ * the induced part, after one round as after six. The causes are the half-sided mirror and the
+ * orders that are not sent. */
 TEST(reciprocals_answer_alike_after_the_rounds)
 {
     static const uint32_t ROUNDS[] = {1, 3, 6};

@@ -94,8 +94,7 @@ TEST(a_reference_frame_out_of_range_is_refused)
     CHECK(isfinite(ctx->reference.lambda_noise));
 }
 
-/* Data whose squares vanish: norms and gaps say nothing, so the answer is zero, of every
- * solver. */
+/* Data whose squares underflow: norms and gaps are zero, so that every solver returns zero. */
 TEST(data_too_small_to_square_give_zero)
 {
     eits_context *ctx = dense_bench_open(&b, SPEC, 0);

@@ -1,5 +1,5 @@
-/* Outliers where the other folds tell what is right: half scans, whose second rows are copies, and
- * which side of a fold is wrong; and channels: many folds that share a pair. */
+/* Outliers that only the other folds show: in half scans, whose second rows are copies; the wrong
+ * side of a fold; and channels, in which many folds share a pair. */
 #include "steps.h"
 
 #include "diagnostics/diagnostics.h"
@@ -179,7 +179,7 @@ TEST(one_outlier_of_a_half_scan)
         clean_frame(&b, 0.15);
         spoil(&b, k, 0.6);
         const uint32_t found = reconstruct(&b);
-        if (k == 15 || k == 18) { /* what no other says anything about may be so */
+        if (k == 15 || k == 18) { /* a fold that no other predicts may have any value */
             CHECK(found == 0 && ctx->info.masked == 0);
             continue;
         }
@@ -300,8 +300,8 @@ TEST(the_wrong_side_goes)
     }
 }
 
-/* Two wrong of three that agree: the third tells, also of one that is little beside a great one.
- * With one fold left out nothing tells. */
+/* Two of three related folds are wrong: the third shows this, also for a small one beside a large
+ * one. If one fold is left out, nothing shows it. */
 TEST(several_wrong_sides)
 {
     static const double FACTORS[3][2] = {{1.4, 1.6}, {1.3, 5}, {5, 1.3}};

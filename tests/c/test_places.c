@@ -1,5 +1,4 @@
-/* Sections MOVE and ROWE, and what the reference makes of them: places go to where touches lie, and
- * back. */
+/* Sections MOVE and ROWE: corrections of places by the reference, forwards and backwards. */
 #include "check.h"
 #include "small_model.h"
 

@@ -1,5 +1,5 @@
-/* A reference that follows the untouched skin: when it moves and how far, what it never follows,
- * and what is known of a gain that could not be followed. */
+/* A reference that follows the untouched skin: when and how far it moves, what it never follows,
+ * and the gain that it could not follow. */
 #include "steps.h"
 
 #include "diagnostics/diagnostics.h"

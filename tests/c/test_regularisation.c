@@ -190,7 +190,7 @@ TEST(learned_with_it)
     for (int i = 0; i < SMALL_ROWS; ++i) {
         mean[i] = R(0.5) * (untouched[0][i] + untouched[1][i]);
         square += pow((double)(untouched[1][i] - untouched[0][i]), 2) / 2;
-        /* says nothing: the third alone tells */
+        /* gives no information; only the third does */
         untouched[3][i] = (mean[i] + mean[i] + untouched[2][i]) / 3;
     }
     LEARN(ctx, UNTOUCHED, untouched);

@@ -211,8 +211,8 @@ TEST(without_a_residual_a_place_is_not_rated)
 
 static float errors[RANK * (RANK + 1) / 2];
 
-/* A reference whose folds are the model's times exp(by), up and down in turn, and whose second
- * sides are `apart` of the reference's rms off. */
+/* A reference whose folds are the model's times exp(by), alternately up and down, and whose second
+ * sides differ by `apart` of the reference's rms. */
 static eits_reference tared(eits_context *ctx, double by, double apart)
 {
     eits_real frame[SMALL_ROWS];
@@ -234,8 +234,8 @@ static eits_reference tared(eits_context *ctx, double by, double apart)
     return ctx->reference;
 }
 
-/* By the tare alone: a reference that differs row by row, or from its own reciprocals, by more than
- * a skin does; only where the model says what it may be wrong by, and never of ratios. */
+/* The tare alone decides: the reference differs row by row, or from its own reciprocals, by more
+ * than a skin does. This holds only for models with model errors, and not for ratio data. */
 TEST(the_tare_says_that_the_instrument_is_far)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);
@@ -328,9 +328,9 @@ TEST(the_unsure_touch_of_a_far_instrument_is_the_images_middle)
     }
 }
 
-/* Where the touch is sure, not tested, one of two, on an instrument that fits, or where the image
- * says nothing, nothing of that sign, or has two halves with the other sign between them: as the
- * test left it. */
+/* The touch stays as the test left it in these cases: it is certain, or was not tested, or is one
+ * of two; the instrument fits; or the image is empty, has nothing of that sign, or has two halves
+ * with the other sign between them. */
 TEST(other_touches_stay)
 {
     static const eits_disc at[] = {{-21, 9, 11, R(0.05), 1},

@@ -277,7 +277,7 @@ TEST(work_is_counted)
     info = solve(ctx, 3, EITS_SIGN_INCREASE, 0.25);
     CHECK_EQUAL(info.macs, whole + column + 3 * (whole + column) + whole);
     ctx->frame.y[3] = 0;
-    info = solve(ctx, 20, EITS_SIGN_INCREASE, 0.25); /* no more than S'y where there is nothing */
+    info = solve(ctx, 20, EITS_SIGN_INCREASE, 0.25); /* only S'y if there is no signal */
     CHECK_EQUAL(info.macs, whole);
     /* with the frame stage: P d over all folded rows, of differences and of logarithms, and two
      * projections' passes for the drift direction at first */

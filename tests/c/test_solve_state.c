@@ -88,8 +88,8 @@ TEST(warm_start_saves_iterations)
     CHECK(2 * needed[1] <= needed[0]);
 }
 
-/* After lift-off, a frame of noise with the touch's coefficients as its start: what is left is what
- * a cold start gives. */
+/* After lift-off, a frame of noise starts from the touch's coefficients; the result is that of a
+ * cold start. */
 TEST(no_ghost_after_lift_off)
 {
     eits_context *ctx = set_up(&b, RANDOM);

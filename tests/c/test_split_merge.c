@@ -76,7 +76,7 @@ static void check_residual(eits_context *ctx, const eits_fit *f)
         CHECK_NEAR(f->residual[i], left[i], 100 * EPS * size);
 }
 
-/* Wherever they stand among the others. */
+/* They are found at any position in the list. */
 static void two_halves_become_one(int first)
 {
     eits_context *ctx = dense_bench_open(&b, WAVES, 0);

@@ -127,9 +127,9 @@ static double unexplained(const double *y, const double *atoms, uint32_t count, 
     return dense_dot(rest, rest, RANK);
 }
 
-/* What a touch explains is the fraction of |y|^2 that leaving the touch out leaves unexplained, the
- * others taking up what they can: for discs that overlap, at pixel centres, with their strengths
- * alone fitted. One peak of the image has nothing behind it. */
+/* A touch explains the fraction of |y|^2 that remains unexplained if it is left out and the
+ * strengths of the others are fitted again: for overlapping discs, at pixel centres. One peak of
+ * the image is empty: the data have no touch there. */
 TEST(explained_is_what_leaving_out_costs)
 {
     /* x, y mm, change */
@@ -207,7 +207,8 @@ TEST(each_touch_must_exceed_the_detection_threshold)
     small_model_free(&made);
 }
 
-/* Data that stand out of the noise tell the radius; in noise it is what strength suggests. */
+/* If the data are well above the noise, they determine the radius; otherwise the radius follows
+ * from the strength. */
 TEST(radius_by_the_data_or_by_the_noise)
 {
     static const double noises[] = {1e-5, 0.02, 4};

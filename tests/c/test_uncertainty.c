@@ -1,5 +1,4 @@
-/* The section UNCE: what it says the model may be wrong by, and everything that a reader refuses.
- */
+/* The section UNCE: the model's errors, and the values that a reader rejects. */
 #include "base/vec.h"
 #include "check.h"
 #include "small_model.h"
@@ -61,7 +60,7 @@ static void it_is_read_in_place(void)
 
 static void what_is_no_second_moment_is_refused(void)
 {
-    /* where, and what: numbers that are none, variances below 0, shares below 0 or without end */
+    /* place and value: NaN, variances below 0, shares below 0 or infinite */
     static const struct {
         uint32_t at;
         float value;

@@ -126,7 +126,7 @@ TEST(a_ring_says_where)
     CHECK_EQUAL(b.reported, 0);
     give(&b, EITS_EVENT_DOWN, 3, -100, 20); /* the inner border is in */
     give(&b, EITS_EVENT_MOVE, 3, -100, 22);
-    CHECK_EQUAL(b.reported, 0); /* the first finger says where */
+    CHECK_EQUAL(b.reported, 0); /* the place is that of the first finger */
     give(&b, EITS_EVENT_MOVE, 1, -100, 0);
     CHECK_EQUAL(b.reported, 0); /* the other is still in it */
     give(&b, EITS_EVENT_MOVE, 3, -80, 22);

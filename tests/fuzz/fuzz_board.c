@@ -130,7 +130,7 @@ static void check_packet(const eits_link_packet *packet)
         MUST(size >= sizeof head);
         memcpy(&head, payload, sizeof head);
         MUST(size == sizeof head + 5u * head.n_rows);
-        for (uint32_t i = 0; i < head.n_rows; ++i) { /* no number where its quality says why */
+        for (uint32_t i = 0; i < head.n_rows; ++i) { /* NaN if the quality gives a reason */
             float value;
             memcpy(&value, payload + sizeof head + 4 * i, 4);
             MUST(isfinite(value) ||
@@ -649,7 +649,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     m = start[which].m;
     bursts_left = MAX_BURSTS;
     worn = false;
-    /* where the power goes, the rest of the input goes on after it */
+    /* after a loss of power the rest of the input continues */
     if (setjmp(fake.cut) != 0) {
         const bool was_open = m.instrument.solve.engine.open;
         const bool locked =

@@ -86,8 +86,8 @@ static uint32_t ended_stretches(const uint8_t *bytes, size_t size)
     return count;
 }
 
-/* 1 where the bytes end inside a stretch: then it may have overrun, but is counted as nothing else.
- */
+/* 1 if the bytes end inside a stretch: it may have overrun, but must be counted as nothing else.
+ * */
 static uint32_t open_end(const uint8_t *bytes, size_t size)
 {
     return size > 0 && bytes[size - 1] != 0;

@@ -76,7 +76,7 @@ static void fill(uint8_t *to, uint32_t size, const uint8_t *from, uint32_t have)
         to[i] = have > 0 ? from[i % have] : 0;
 }
 
-/* Tables whose numbers point where there is something. */
+/* Tables whose offsets point to existing data. */
 static void point_right(uint8_t *at[SECTIONS], const uint32_t d[10])
 {
     const uint32_t electrodes = d[0], m = d[1], k = d[2], n = d[5], nx = d[6];

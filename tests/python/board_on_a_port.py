@@ -50,7 +50,7 @@ class Wire:
             time.sleep(self._frame_s or 0.001)
 
     def unplug(self) -> None:
-        """Pull it out: what is open gets errors, and the path is gone."""
+        """Unplug the board: open files get errors, and the path disappears."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join(5)

@@ -1,4 +1,4 @@
-"""A fresh Python process for what must not depend on what tests have imported before."""
+"""A new Python process, for results that must not depend on what tests have imported before."""
 
 import os
 import shlex

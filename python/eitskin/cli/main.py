@@ -121,7 +121,7 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
             if find_spec(entry.module.partition(".")[0]) is not None:
                 entry.load().add_parser(subparsers)
     if only in STUDIES and only not in subparsers.choices:
-        raise missing_checkout(f"eitskin {only}", "firmware/emulator", "studies")
+        raise missing_checkout(f"eitskin {only}", "firmware/emulator", "hardware", "studies")
     return parser
 
 

@@ -18,6 +18,7 @@ from eitskin.scene.simulate import Simulated
 from eitskin.scoring import metrics
 from eitskin_studies.benchmarks.solve_problems import bench_options, make_problems, models, sessions
 from eitskin_studies.compare.run import truth_masks
+from eitskin_studies.harness.sections import Filling
 from eitskin_studies.harness.thresholds import best_threshold, miou_curves
 
 MIN = 1e-7
@@ -123,3 +124,26 @@ def text(curves: GapCurves) -> str:
             f" {s.worst_tenth:12.3f} {s.macs / 1e3:8.0f} {s.threshold:5.2f}"
         )
     return "\n".join(lines)
+
+
+OPTIMUM = "active set, to the optimum"
+NAMES = {"fista": "FISTA", "working-set": "FISTA on a working set"}
+HEAD = ("solver", "MACs a frame, mean", "(F - F*) / F*", "MIoU", "mean of worst 10 %")
+
+
+def for_page(curves: GapCurves, command: str) -> Filling:
+    """The marks of studies/results/benchmarks.md."""
+    rows = []
+    for one in curves.stops:
+        if one.solver == "active-set":
+            name = f"active set, {one.effort // 1000} kMAC at most" if one.effort else OPTIMUM
+        else:
+            name = f"{NAMES[one.solver]}, {one.effort} iterations"
+        rows.append(
+            (
+                name, f"{one.macs / 1e3:,.0f} k", f"{one.suboptimality:.1e}",
+                f"{one.miou:.3f}".lstrip("0"), f"{one.worst_tenth:.3f}".lstrip("0"),
+            )
+        )  # fmt: skip
+    run = f"By `{command}`, with the scenes `{curves.train}` and `{curves.test}`."
+    return {"optimum-run": run}, {"optimum": (HEAD, rows)}

@@ -39,34 +39,43 @@ def add_solve(what: Any) -> None:
     option(parser, "--scenes", "problems for each model", default=20)
     option(parser, "--seed", "seed of the scenes", default=3)
     option(parser, "--rounds", "interleaved rounds", default=11)
-    option(parser, "--picture FILE", "draw suboptimality against MIoU instead", Path)
-    option(parser, "--json")
+    option(parser, "--optimum", "compare suboptimality with MIoU instead; --page is about this")
+    add_page_option(parser)
     parser.set_defaults(run=run_solve)
 
 
 def run_solve(options: argparse.Namespace) -> int:
-    """Time the solvers, or draw what their suboptimality means for images."""
+    """Time the solvers, or compare their suboptimality with the MIoU of their images."""
     from eitskin.fileio import refuse_unwritable
 
     check_within("--scenes", options.scenes, 4, 1000)
     check_within("--seed", options.seed, 0, 2**31 - 1)
     check_within("--rounds", options.rounds, 3, 10_000)
-    refuse_unwritable(options.picture)
-    if options.picture is not None:
-        from eitskin_studies.benchmarks import suboptimality
-        from eitskin_studies.pictures.suboptimality_picture import draw_suboptimality
-
-        curves = suboptimality.run(options.scenes, options.seed, progress_bar)
-        draw_suboptimality(options.picture, curves.as_dict())
-        print(
-            json.dumps(curves.as_dict(), indent=2) if options.json else suboptimality.text(curves)
-        )
-        return 0
+    refuse_unwritable(options.page)
+    if options.optimum:
+        return _show_optimum(options)
+    if options.page is not None:
+        raise UsageError("bench solve: --page needs --optimum; times are not on a page")
     from eitskin_studies.benchmarks import solve as bench_solve
 
     result = bench_solve.run(options.scenes, options.seed, options.rounds, progress_bar)
     print(json.dumps(result, indent=2) if options.json else bench_solve.text(result))
     return 0
+
+
+def _show_optimum(options: argparse.Namespace) -> int:
+    from eitskin_studies.benchmarks import suboptimality
+    from eitskin_studies.harness.drawings import Drawing, draw_again, keep_drawings
+    from eitskin_studies.pictures.suboptimality_picture import draw_suboptimality
+
+    curves = suboptimality.run(options.scenes, options.seed, progress_bar)
+    if options.page is not None:
+        drawing = Drawing(draw_suboptimality, curves.as_dict())
+        keep_drawings(options.page, {"pictures/suboptimality.svg": drawing})
+        draw_again(options.page)
+    command = f"eitskin bench solve --optimum --scenes {options.scenes} --seed {options.seed}"
+    filling = suboptimality.for_page(curves, command)
+    return show(options, curves, suboptimality.text(curves), filling)
 
 
 def add_batches(what: Any) -> None:

@@ -54,7 +54,7 @@ OTHERS = {
     "view": "bench view --seconds 30 --page {results}/outputs.md",
     "view-load": "bench view --seconds 300 --load --page {results}/outputs.md",
     "growth": "bench growth --rounds 21 --page {results}/benchmarks.md",
-    "suboptimality": "bench solve --scenes 60 --picture {results}/pictures/suboptimality.svg",
+    "optimum": "bench solve --optimum --scenes 60 --seed 1 --page {results}/benchmarks.md",
 }
 # commands that time this computer, that need what others have filled, or that install the package
 # again if a file changed: one by one, at the end

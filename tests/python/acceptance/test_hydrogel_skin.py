@@ -1,5 +1,6 @@
-"""A measured hydrogel skin whose front end is far from any model: what default options make of its
-presses before it is taught. The data are not part of the project; without them this is skipped."""
+"""A measured hydrogel skin whose front end is far from any model: results of default options for
+its presses before it is taught. The data are not part of the project; without them this is
+skipped."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
-"""Touches on skins whose electrodes or outline lie elsewhere than modelled: the tare tells, and
-places are taken back."""
+"""Touches on skins whose electrodes or outline are not where the model has them: the tare shows
+this, and places are corrected."""
 
 from dataclasses import replace
 

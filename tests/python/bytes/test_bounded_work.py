@@ -1,5 +1,5 @@
-"""Small files that ask for much work or memory are refused before it is done, in one line that says
-what is too much."""
+"""Small files that would cause much work or memory are refused before it is done, with one line
+that says what is too much."""
 
 import io
 import math

@@ -1,5 +1,5 @@
-"""Any bytes as an .eitm model: read by Python and C alike or refused in a line; what is read can be
-used."""
+"""Any bytes as an .eitm model: Python and C both read them or both refuse them with one line. A
+model that is read can be used."""
 
 import numpy as np
 from bytes_damage import any_bytes, bounded, read_or_refuse, written

@@ -1,5 +1,5 @@
-"""The fit finds laws and gains that are known, says how sure it is, and refuses what cannot
-tell."""
+"""The fit finds known laws and gains, reports its uncertainty, and refuses presses that cannot
+determine them."""
 
 from dataclasses import replace
 

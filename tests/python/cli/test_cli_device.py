@@ -127,8 +127,7 @@ def test_solver_options_reach_the_board(done, scene):
 
 
 def test_findings_are_said_once_they_rise_and_stand_in_each_frame(scene, ran):
-    """Touches that conduct, where what insulates is looked for, are what a stale reference
-    gives."""
+    """Conducting touches look like a stale reference if insulating touches are looked for."""
     command = f"stream --device sim:{scene} --sign decrease"
     out, err = ran(0, command, "--json")
     frames = json_lines(out)[:-1]

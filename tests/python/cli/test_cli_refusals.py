@@ -3,6 +3,7 @@ do, without a traceback, and leaves no file. tests/python/docs/mistakes.md has t
 mistakes, which are not repeated here."""
 
 import io
+import re
 import struct
 import sys
 from pathlib import Path
@@ -12,11 +13,13 @@ import pytest
 
 from eitm_bytes import sealed, sections_of
 from eitskin.cli.main import COMMANDS, STUDIES, build_parser, main
+from eitskin.config import load_toml
 from eitskin.errors import sources_url
 from eitskin.skin.protocol import opposite
 from fresh_python import MAIN, run_python, without
 from small_models import prebuilt, session, small_blob
 
+ROOT = Path(__file__).resolve().parents[3]
 USAGE, FILE, CONFIG, GEOMETRY, MODEL, PROTOCOL, FRAME, EXTRA, VERIFICATION = range(2, 11)
 
 
@@ -57,13 +60,30 @@ def test_a_command_of_the_studies_says_where_they_are(command, refused, monkeypa
     monkeypatch.setattr("eitskin.errors.checkout", lambda: Path("/my sources"))
     assert refused(EXTRA, f"{command} --help") == (
         f"eitskin {command} is not installed yet: run  pip install '/my sources/firmware/emulator'"
-        " '/my sources/studies'"
+        " '/my sources/hardware' '/my sources/studies'"
     )
     monkeypatch.setattr("eitskin.errors.checkout", lambda: None)
     assert refused(EXTRA, f"{command} --help") == (
         f"eitskin {command} comes with eitskin's sources, not with the wheel: run  git clone"
-        f" {sources_url()}  and in its folder  pip install ./firmware/emulator ./studies"
+        f" {sources_url()}  and in its folder  pip install ./firmware/emulator ./hardware ./studies"
     )
+
+
+@pytest.mark.parametrize(
+    "page",
+    ["README.md", "docs/guide/scenes.md", "docs/guide/own-method.md", "studies/results/README.md"],
+)
+def test_a_page_installs_all_folders_that_the_studies_need(page):
+    """The demo has installed eitskin and the emulator before the README comes to the studies."""
+    folders = {"eitskin-emulator": "./firmware/emulator", "eitskin-hardware": "./hardware"}
+    needed = load_toml(ROOT / "studies" / "pyproject.toml", "project")["project"]["dependencies"]
+    own = {folders[one] for one in needed if one in folders}
+    assert own == set(folders.values())
+    text = (ROOT / page).read_text(encoding="utf-8")
+    there = {"./firmware/emulator"} if page == "README.md" else set()
+    commands = [one.split() for one in re.findall(r"pip install ([^`]*)`", text)]
+    commands = [one for one in commands if "./studies" in one]
+    assert commands and all(own <= set(one) | there for one in commands)
 
 
 def test_version(capsys):

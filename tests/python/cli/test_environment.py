@@ -1,5 +1,5 @@
-"""What the user set for other programs changes neither what the command line does nor what it
-draws."""
+"""Settings of the user for other programs change neither the output of the command line nor its
+pictures."""
 
 import os
 import subprocess

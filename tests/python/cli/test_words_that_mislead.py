@@ -1,4 +1,4 @@
-"""Messages name what is there, and what to do about it; printed commands can be pasted."""
+"""Messages name what was found and what to do about it; printed commands can be pasted."""
 
 import shlex
 import time

@@ -1,5 +1,5 @@
-"""The C core as a library: what it asks of the world, what it keeps, what it shows; and its
-sources."""
+"""The C core as a library: functions that it needs from outside, memory that it keeps, names that
+it exports; and its sources."""
 
 import re
 import shutil

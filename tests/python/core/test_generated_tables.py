@@ -1,5 +1,5 @@
-"""The tables say the same everywhere: what is written from them is up to date, the core's table of
-options is Python's, and all that the headers declare reaches Python."""
+"""The generated tables are up to date, the core's table of options is Python's, and everything that
+the headers declare is available in Python."""
 
 import importlib
 import re

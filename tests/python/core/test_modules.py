@@ -116,7 +116,8 @@ def test_no_circle_of_files(folder, read):
 
 
 def uses(texts: dict[str, str]) -> dict[str, set[str]]:
-    """For each source the other sources whose functions it names; a header belongs to none."""
+    """Return for each source the other sources whose functions it names; a header belongs to
+    none."""
     bare = {name: re.sub(r"/\*.*?\*/", "", text, flags=re.S) for name, text in texts.items()}
     defined = re.compile(r"^(?!static|typedef)\w[\w *]*?\b(\w+)\([^;{}]*\)\s*\{", re.M)
     owner = {one: name for name, text in bare.items() for one in defined.findall(text)}
@@ -135,8 +136,8 @@ def sources(folder: Path) -> dict[str, str]:
 
 
 def test_no_circle_of_calls():
-    """Files may call each other in a circle although their includes have none: where one header
-    declares the functions of several files."""
+    """Files could call each other in a circle although their includes form none, because one header
+    may declare the functions of several files."""
     edges = uses(sources(CSRC / "src"))
     TopologicalSorter(edges).prepare()
     assert "frame/rows_out.c" in edges["frame/whitening.c"]

@@ -1,5 +1,4 @@
-"""The codec through cffi: what is sent arrives, what is damaged does not, and every byte is
-accounted for."""
+"""The codec through cffi: sent packets arrive, damaged ones do not, and every byte is counted."""
 
 import pytest
 from hypothesis import given, settings

@@ -61,8 +61,8 @@ def faults(items: Iterable[object]) -> list[tuple[int, bool, int, int]]:
 
 @pytest.mark.parametrize("every", [1, 4])
 def test_an_electrode_that_comes_off_is_named_and_goes_when_it_is_back(every):
-    """In that very frame; two frames later where touches are tracked through scans, which might be
-    what the change is."""
+    """The electrode is named in that very frame. If touches are tracked through scans, it is named
+    two frames later, because a touch might have caused the change."""
     late = 2 if every == 1 else 0
     with sim_device(board()) as device:
         device.tare(UNTOUCHED)

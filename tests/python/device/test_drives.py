@@ -1,5 +1,5 @@
-"""Touches after each drive of a simulated board: where and when they are reported, what a recording
-gives again to the bit, and what is refused."""
+"""Touches after each drive of a simulated board: their places and times, a recording that
+reproduces them bit for bit, and refused requests."""
 
 from dataclasses import replace
 from pathlib import Path

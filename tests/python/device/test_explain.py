@@ -1,4 +1,4 @@
-"""A board's numbers in words: each number stands where it belongs, each text says what to do."""
+"""A board's numbers in words: each number is in its place, and each text says what to do."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
-"""Flashing: the exact command lines of each tool, what goes where, and what is refused. No board is
-touched."""
+"""Flashing: the exact command lines of each tool, the places of firmware and model, and refusals.
+No board is used."""
 
 import struct
 from io import StringIO

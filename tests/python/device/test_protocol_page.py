@@ -1,4 +1,4 @@
-"""docs/reference/link-protocol.md says what the code does: sizes, the worked example, version and
+"""docs/reference/link-protocol.md agrees with the code: sizes, the worked example, version and
 limits."""
 
 import re

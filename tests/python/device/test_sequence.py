@@ -20,7 +20,8 @@ Event = str | int | tuple[int, int, bool]  # (number, content, an INFO with requ
 
 
 def judged(events: list[Event]) -> tuple[list[int | None], dict[str, int]]:
-    """Verdicts on packets, a number alone for one whose content is its number; what is counted."""
+    """Return the verdicts on packets, and the counters. An event that is only a number is a packet
+    with this number and this content."""
     counters = LinkCounters()
     check, verdicts = SequenceCheck(counters), []
     for event in events:
@@ -114,8 +115,8 @@ def packet(number: int, *, restart: bool = False) -> bytes:
 
 
 def test_whole_packets_shuffled_dropped_and_doubled():
-    """Against a plain account of the same packets: in order, each once, and what is missing is what
-    is not there."""
+    """The verdicts agree with a simple count of the same packets: in order, each once, and the
+    numbers that never came are missing."""
     for seed in range(60):
         generator = random.Random(seed)
         numbers, n = [], generator.randrange(TOP)

@@ -33,7 +33,8 @@ EXCITATION_HZ, SETTLE_US = 50_000.0, 16
 
 @dataclass
 class Session:
-    """A board that has scanned a few frames of a touched skin without noise, and what it said."""
+    """A board that has scanned a few frames of a touched skin without noise, and the packets that
+    it sent."""
 
     board: EmulatedBoard
     protocol: Protocol
@@ -178,7 +179,7 @@ def settled(session: Session) -> str | None:
 
 
 def interrupts(session: Session) -> str | None:
-    """One interrupt a burst: none is lost, none comes twice."""
+    """There is one interrupt per burst: none is lost, and none comes twice."""
     board = session.board
     taken, bursts = board.record.interrupts[16 + 56], board.adc.conversions / 80
     return (

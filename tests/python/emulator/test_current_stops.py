@@ -47,7 +47,8 @@ def opens_after_us(board: EmulatedBoard, most_us: int) -> float:
 
 
 def restarts_for(board: EmulatedBoard, cause: str, fault: FaultCode, within_s: float = 0.2) -> None:
-    """``cause`` is what restarts the board, without current until then and after; it says why."""
+    """Check that ``cause`` restarts the board, that no current flows until then and afterwards, and
+    that the board reports the fault."""
     end = board.clock.now + round(within_s * TICKS_PER_S)
     board.run_until(end, lambda: len(board.record.resets) > 1)
     assert board.record.resets == ["power", cause]

@@ -1,5 +1,5 @@
-"""A taught model uploaded to the emulated board: what it streams is this host's, to the bit; what
-numpy makes of it is in teaching/test_teach.py."""
+"""A taught model on the emulated board: its results have the bits of this host.
+teaching/test_teach.py compares with numpy."""
 
 import zlib
 

@@ -14,8 +14,9 @@ from eitskin.skin.skin import Skin
 
 
 def test_fields_are_those_of_the_jacobian():
-    """Differences of electrodes are the patterns' fields, to rounding; the product of the pixels'
-    means is the mean of products but for what the fields change within a pixel."""
+    """Differences of the electrodes' fields are those of the patterns, to rounding. The product of
+    the means over a pixel is the mean of the products, except for the change of the fields within
+    the pixel."""
     skin = Skin("disk", disk(100.0), Electrodes(16, 3.0), 0.02, 5.0)
     protocol = adjacent(16)
     mesh = mesh_for_elements(skin, 3000)

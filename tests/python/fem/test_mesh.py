@@ -1,4 +1,4 @@
-"""Meshes: what they fill, where electrodes end, and a mesher that hangs or fails."""
+"""Meshes: the filled area, the ends of electrodes, and a mesher that hangs or fails."""
 
 import os
 import subprocess

@@ -28,7 +28,7 @@ class Serial:
         return bool(self.image.call(write, 0, SCRATCH, len(data)) & 0xFF)
 
     def send(self, flag: int = TCIF3) -> bytes:
-        """DMA sends what it has been given, and says so."""
+        """DMA sends the bytes that it was given, and raises its flag."""
         image = self.image
         if not image.read(TX + CR) & EN:
             return b""

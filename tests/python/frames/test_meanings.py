@@ -32,8 +32,7 @@ def doctor(capsys, path, *words):
 
 
 def repaired(capsys, tmp_path, out):
-    """Run the command that the doctor printed, and return the frames and what the doctor then
-    says."""
+    """Run the command that the doctor printed; return the frames, and the doctor's new findings."""
     line = next(line for line in out.splitlines() if line.startswith("  all in one: "))
     command = shlex.split(line.partition(": ")[2])
     made = tmp_path / "repaired.npz"

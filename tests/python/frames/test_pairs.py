@@ -1,5 +1,5 @@
-"""Pairs of columns: what the header says is believed, what nothing says is asked for, and no phase
-is ever taken for a voltage."""
+"""Pairs of columns: the header is used if it says what they are, otherwise the user is asked; a
+phase is never taken for a voltage."""
 
 from pathlib import Path
 

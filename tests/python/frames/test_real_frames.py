@@ -116,7 +116,7 @@ def test_mended_raw_exports_are_clean(shared_data, name, part):
 
 
 def test_the_metal_rod_changes_most_beside_its_electrode(shared_data):
-    """A rod beside electrode 0 (1 in the data's own words), and in the second file beside 0 and 12
+    """A rod is beside electrode 0 (1 in the names of the data), in the second file beside 0 and 12
     (1 and 13)."""
     for name, electrodes in zip(TANKS, ((0,), (0, 12)), strict=True):
         frames = import_frames(shared_data / name, MENDED, adjacent(16), KIT4)

@@ -13,7 +13,7 @@ ROOT = TESTS.parents[1]
 
 @dataclass(frozen=True)
 class Case:
-    """A case that makes an EIT skin's numbers go wrong; ``cases.toml`` says what the fields are."""
+    """A case that makes an EIT skin's numbers go wrong; ``cases.toml`` explains the fields."""
 
     id: str
     what: str

@@ -46,7 +46,7 @@ SHOWN = (  # group, which of it, sign looked for, title
 
 
 def panel(group: str, which: int, sign: str, title: str) -> Panel:
-    """One scene's image with what was there and what was found."""
+    """Draw one scene's image with the true and the found touches."""
     model, blob = prebuilt()
     options = replace(default_options(model), sign=sign)
     frames = frames_of(group)[which : which + 1]

@@ -95,9 +95,9 @@ def judged(s: np.ndarray, data: np.ndarray, sign: str, one: Outcome) -> Judged:
 
 
 def check_sound(margins: Margins, case: str, point: Judged, one: Outcome) -> None:
-    """All that holds for every result: finite numbers, signs kept, objective, residual and gap no
-    worse than at the start, and what is reported is what a float64 look at the coefficients finds;
-    each but for rounding."""
+    """Check what holds for every result, up to rounding: numbers are finite and signs are kept;
+    objective, residual and gap are no worse than at the start; and the reported values are those
+    that float64 finds for the coefficients."""
     assert one.status == 0 and one.finite()
     within = margins.of(case)
     allowed = {"increase": 1, "decrease": -1}.get(point.sign)

@@ -1,5 +1,5 @@
-"""Matrices whose columns do not tell coefficients apart: duplicates, opposites, zeros, low ranks;
-and whitened ones."""
+"""Matrices whose columns do not determine the coefficients: duplicates, opposites, zeros, low
+ranks; and whitened ones."""
 
 from itertools import product
 

@@ -123,7 +123,7 @@ def test_merge_and_part(same_everywhere, margins):
 
 
 def test_centre(same_everywhere, margins):
-    """Farthest from every electrode, where the data say least."""
+    """The middle is farthest from every electrode, and the data contain least about it."""
     (one,), ((truth,),) = reconstruct(same_everywhere, frames_of("centre")), groups()["centre"]
     check_alone(margins, "physics/centre", "centre", one, truth)
 
@@ -251,9 +251,9 @@ def is_one_group(one: Outcome, touches: tuple[TrueTouch, ...]) -> bool:
 
 
 def test_more_touches_than_can_be_told_apart(same_everywhere, margins):
-    """Finite, on the skin, at most as many as asked for; and that they are too many is said, but
-    where each is found all the same, and for a group within the size of one touch, which is found
-    as one that covers it."""
+    """All numbers are finite, and touches are on the skin and at most max_touches. The core reports
+    that there are too many, unless it finds each of them, or, for a group of the size of one touch,
+    a touch that covers the group."""
     outcomes = reconstruct(same_everywhere, frames_of("crowds"))
     for (name, touches), one in zip(crowds().items(), outcomes, strict=True):
         most = default_options(prebuilt()[0]).max_touches

@@ -11,8 +11,8 @@ HOUR_S = 3600.0
 
 
 def test_gain_drift(same_everywhere, margins):
-    """The whole gain off by 1 to 20 %: the peak follows it and loses no more; at 5 % at most 2
-    %."""
+    """The gain of all rows is off by 1 to 20 %. The peak changes in proportion and loses no more;
+    at 5 % it loses at most 2 %."""
     within = margins.of("frames/gain-drift")
     gained = played(lambda k: [noisy(k, g * simulated()[k]["touched"], 1) for g in (1.0, *GAINS)])
     lost, worse = np.zeros((COUNT, len(GAINS))), np.zeros((COUNT, len(GAINS)))
@@ -59,8 +59,8 @@ def test_common_mode_jump(same_everywhere, margins):
 
 
 def test_touch_during_tare(same_everywhere, margins):
-    """Not to be known then. Once it has gone, the change goes the way touches cannot, and that is
-    said."""
+    """During the touch the fault cannot be noticed. After the lift the frame changes in a way in
+    which no touch changes it, and this is reported."""
     lifts = []
     for k in range(COUNT):
         untouched = noisy(k, np.tile(simulated()[k]["touched"], (16, 1)), 0)

@@ -50,7 +50,7 @@ def crowds() -> dict[str, tuple[TrueTouch, ...]]:
 
 
 def entangled() -> dict[str, tuple[TrueTouch, ...]]:
-    """Touches that bend each other's field beyond what two dipoles tell, or hide each other's
+    """Touches that change each other's field more than two dipoles describe, or hide each other's
     peaks."""
     return {
         "two that overlap": (*at(6.0, 30.0), *at(6.0, 210.0)),

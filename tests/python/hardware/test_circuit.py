@@ -1,5 +1,5 @@
-"""The circuit as code: electrical rules, netlist, parts, wiring, and that what is kept in
-hardware/made is what the code makes."""
+"""The circuit as code: electrical rules, netlist, parts and wiring; and the files in hardware/made
+are those that the code makes."""
 
 import csv
 import io

@@ -1,5 +1,5 @@
-"""The .eitm file: what is written is read again, the bytes lie where docs/reference/eitm-format.md
-says, and damage is refused."""
+"""The .eitm file: a written model is read again, its bytes are where docs/reference/eitm-format.md
+has them, and damage is refused."""
 
 import json
 import struct

@@ -1,5 +1,5 @@
-"""The section LOAD: written, read by both readers, skipped where it is not there, refused where it
-is out of range."""
+"""The section LOAD is written, read by both readers, optional, and refused if it is out of
+range."""
 
 import struct
 from dataclasses import replace

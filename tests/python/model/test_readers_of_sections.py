@@ -1,5 +1,5 @@
-"""Both readers take and refuse the same models where sections are missing beside those that need
-them, and where numbers stand at the very end of their range."""
+"""Both readers accept and refuse the same models if required sections are missing, and if numbers
+are at the very end of their range."""
 
 import struct
 from dataclasses import replace

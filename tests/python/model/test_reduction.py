@@ -1,5 +1,4 @@
-"""The reduction against its own definition: what folds, what whitens, and what the greatest
-eigenvalue is."""
+"""The reduction, compared with its definition: folds, whitening and the greatest eigenvalue."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
-"""The whitening of a model, taken apart row by row: what is read from P and S is what they were
-made with."""
+"""The whitening of a model by rows: the values that are read from P and S are those with which they
+were made."""
 
 import numpy as np
 import pytest

@@ -230,8 +230,9 @@ def test_stale_references(sign, times_change):
 @pytest.mark.parametrize("scale", [0.1, 3.0, 30.0, 1e3, 1e6])
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_frame_of_another_scale_than_the_reference_is_named(count, scale):
-    """Other units or a far larger gain than at the tare lose touches, since the drift of the gain
-    is ignored: that is said. Frames of a scale that a skin may have say nothing."""
+    """With other units, or with a far larger gain than at the tare, touches are lost, because the
+    drift of the gain is ignored; this is reported. Frames of a scale that a skin may have cause no
+    diagnostic."""
     touches = random_touches(paper_skin().outline, 2, 9, "test", TouchRules(count=(count, count)))
     scenes = simulate(paper_skin(), adjacent(16), touches, measurement=Measurement(snr_db=60.0))
     made = AllEngines(*prebuilt(), engines=("c", "c64", "numpy"))

@@ -38,8 +38,8 @@ def test_two_touches_differ_from_the_sum_of_each_by_the_interaction(middle, turn
 
 
 def test_far_apart_and_alone():
-    """One disc has none; two at the ends of the sheet have a small part of what near ones have; it
-    grows as both changes do."""
+    """One disc has no interaction. Two at the ends of the skin have a small part of the interaction
+    of near ones. It is proportional to both changes."""
     model = prebuilt()[0]
     near, far = ([Disc(x, 0.0, 9.0, 0.01) for x in (-at, at)] for at in (12.0, 70.0))
     assert not interaction(model, near[:1]).any()

@@ -194,7 +194,7 @@ def row_factors(log_sd: float) -> np.ndarray:
 )
 @pytest.mark.parametrize("row_gains", [0, 1])
 def test_row_gains(name: str, spoil: Callable[[np.ndarray], np.ndarray], row_gains):
-    """They are in force where the skin differs, and not where the instrument does."""
+    """Row gains are used if the skin differs, and not if the instrument does."""
     made = AllEngines(*prebuilt(), row_gains=row_gains)
     made.tare(narrow(spoil(session().untouched_v)))
     frames = narrow(spoil(session().frames_v[:3]))

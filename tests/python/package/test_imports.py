@@ -97,8 +97,8 @@ def graph(package: str) -> dict[str, set[str]]:
 
 
 def entered(name: str, others: set[str]) -> set[str]:
-    """The packages whose ``__init__`` Python runs on the way to ``others``, but for those that
-    ``name`` itself stands in."""
+    """Return the packages whose ``__init__`` Python runs on the way to ``others``, except those
+    that contain ``name``."""
     parents = {other.rpartition(".")[0] for other in others}
     return {parent for parent in parents if not f"{name}.".startswith(f"{parent}.")}
 

@@ -63,7 +63,7 @@ class Page:
         self.driver = webdriver.Chrome(options, Service("/usr/bin/chromedriver"))
 
     def open(self, server: PageServer, *, token: str | None = TOKEN) -> None:
-        """The page, afresh, once it has said what it follows."""
+        """Open the page again, and wait until it shows the device."""
         self.driver.get("about:blank")
         self.driver.get(server.address + ("" if token is None else f"#token={token}"))
         until(lambda: "electrodes" in self.text("device"))

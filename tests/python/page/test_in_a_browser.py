@@ -1,5 +1,5 @@
-"""The page in Chromium: what it shows is what is there, and its buttons do what they say. One
-browser for all tests."""
+"""The page in Chromium shows what the device sends, and its buttons work. All tests share one
+browser."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -85,7 +85,8 @@ def assert_shown(page: Page) -> None:
 
 
 def red(page: Page, x_mm: float, y_mm: float) -> int:
-    """How much redder than green the skin is drawn there, beside what marks a touch's middle."""
+    """Return how much redder than green the skin is drawn there, beside the mark of a touch's
+    middle."""
     return int(
         page.run(
             "const c = document.getElementById('skin'), w = c.clientWidth, h = c.clientHeight;"

@@ -156,8 +156,7 @@ def test_the_mouse_presses_the_surface(round_skin, server):
 
 @pytest.fixture(scope="module")
 def dome(folder, page) -> Iterator[PageServer]:
-    """The paper's skin over half a ball, where a mm of the drawing stands for 1 to 2 mm: nothing
-    touches it."""
+    """The paper's untouched skin over half a ball: a mm of the drawing corresponds to 1 to 2 mm."""
     points_mm, triangles = make_shape("hemisphere", 1500)
     flat_mm = flattened(points_mm, triangles)
     size = 97.0 / np.linalg.norm(flat_mm, axis=1).max()

@@ -1,4 +1,4 @@
-"""Robot files: what they say, where links are, and what is wrong with them, in a line."""
+"""Robot files: their contents, the places of links, and errors in one line."""
 
 from pathlib import Path
 

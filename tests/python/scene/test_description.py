@@ -1,4 +1,4 @@
-"""Scenes read from TOML: what they hold, and what is refused, naming file, table and key."""
+"""Scenes that are read from TOML: their contents, and refusals that name file, table and key."""
 
 from pathlib import Path
 

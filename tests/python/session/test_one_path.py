@@ -1,4 +1,5 @@
-"""The one path of a frame: who owns the board, what is asked of it, and what is not imported."""
+"""The one path of a frame: the owner of the board, requests to it, and modules that are not
+imported."""
 
 import subprocess
 import sys

@@ -1,5 +1,5 @@
-"""Objects that threads share: each call is whole, or the other thread is refused by a clear error;
-and what can be pickled. docs/reference/python-api.md, "Threads", is what is tested here."""
+"""Objects that threads share, as docs/reference/python-api.md, "Threads", describes: each call is
+complete, or the other thread gets a clear error. Also what can be pickled."""
 
 import copy
 import pickle

@@ -127,8 +127,8 @@ MARKS = (
 
 
 def test_marks_are_numbered_by_their_ids(tmp_path):
-    """Left, top, right, bottom as drawn; the ids say where 0 is and which way round, and 10 comes
-    after 9."""
+    """The marks are drawn left, top, right and bottom. Their ids determine electrode 0 and the
+    direction, and 10 comes after 9."""
     skin = described(tmp_path, BOX + MARKS.format(2, 9, 10, 11), electrodes='marked = "electrode"')
     assert_centres(skin, [(10, 50), (40, 70), (70, 50), (40, 30)])
     assert skin.electrodes.clockwise and skin.electrodes.count == 4

@@ -127,7 +127,7 @@ def test_reciprocity_with_flips():
 @settings(max_examples=50, deadline=None)
 @given(st.integers(5, 20), st.integers(0, 2**32 - 1))
 def test_reciprocity_of_shuffled_and_flipped_tables(n, seed):
-    """Fold an adjacent table whose rows were shuffled and whose pairs were flipped and swapped at
+    """Fold an adjacent table after its rows were shuffled and its pairs flipped and swapped at
     random."""
     rng = np.random.default_rng(seed)
     rows = adjacent(n).drive_measure.astype(int)

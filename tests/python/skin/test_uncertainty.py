@@ -1,4 +1,4 @@
-"""The table [uncertainty] of a skin's file: defaults, none, and what is refused."""
+"""The table [uncertainty] of a skin's file: defaults, no uncertainty, and refusals."""
 
 from dataclasses import fields, replace
 from typing import Any

@@ -87,8 +87,8 @@ def test_touches_of_simulated_frames(width):
 
 
 def test_names_and_sizes():
-    """The portable kernels say so; the copies in panels, of S and of the working set, are what a
-    prepared context has more."""
+    """The portable kernels report their name. A prepared context is larger by the copies of S and
+    of the working set in panels."""
     model, blob = prebuilt()
     portable, bare = CoreEngine(blob, portable=True), CoreEngine(blob, prepared=False)
     assert portable.kernels == "portable"

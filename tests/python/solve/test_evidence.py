@@ -170,8 +170,8 @@ def test_the_tare_tells_how_far_a_skin_moves_places():
 
 @pytest.mark.parametrize("columns", [1, 60, 120])
 def test_both_widths_stop_at_the_same_column(columns):
-    """With the same touches, and a count that is said to be uncertain where they did. Without the
-    joint fit, by which clear scenes need no test."""
+    """Both report the same touches, and call the count uncertain if they stopped. The joint fit is
+    left out, because with it clear scenes need no test."""
     fit = ALL_TOUCH_FIT & ~JOINT
     for name in ("ellipses", "two_fingers_12_to_16_mm", "drift_2_percent_light"):
         untouched_v, frame_v = world(name).untouched_v[0], world(name).frames_v[0]

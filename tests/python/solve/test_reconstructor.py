@@ -1,4 +1,5 @@
-"""The reconstructor as users see it: what it refuses, what it survives, and what it says of it."""
+"""The reconstructor as users see it: its refusals, the errors after which it still works, and its
+messages."""
 
 from dataclasses import replace
 

@@ -98,7 +98,7 @@ def place(touch: Touch) -> tuple[float, float]:
 
 
 def test_places_are_those_of_each_frame():
-    """What is reported of a touch that was found is what the frame by itself gives, but for id and
+    """A touch that was found is reported as in the frame by itself, except for its id and its
     confirmation."""
     core, alone = made(options()), made(options())
     for frame in stream()[1]:

@@ -1,4 +1,4 @@
-"""Surfaces that are no skins are refused in one line that says what is wrong."""
+"""Surfaces that cannot be skins are refused with one line that says what is wrong."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
-"""A file of presses gives back what was written, and what cannot be presses is refused in a line
-that says which press and what to do."""
+"""A file of presses is read as it was written. Values that cannot be presses are refused with one
+line that names the press and what to do."""
 
 import numpy as np
 import pytest

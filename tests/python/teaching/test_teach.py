@@ -41,7 +41,7 @@ def test_a_turn_is_said_the_short_way_round():
 
 
 def test_ellipses_cover_about_what_they_say(taught):
-    """Thirty presses tell their factor badly, for which reason the model has none."""
+    """Thirty presses do not determine the factor of their ellipses well, so the model has none."""
     judged, factor = presses(100, seed=2), ellipse_factor(taught.held.mahalanobis2)
     assert taught.model.place_factor == 0 and taught.report["ellipse_factor"] is None
     squared = solve_presses(replace(taught.model, place_factor=factor), judged)[3]

@@ -267,9 +267,9 @@ def chosen_words(levers: dict[Levers, Found], best: Levers) -> str:
     means = sorted(float(np.mean(one["touch_like"])) for one in near)
     measured = float(np.mean(levers[best]["touch_like"]))
     return (
-        f"Of {len(levers)} settings, {best.kind} data with {words_of(best)} have the highest MIoU"
-        f" on simulated frames: {_of(top)} there, {_of(measured)} on the measured touch-like"
-        f" frames. {len(near)}"
+        f"Among {len(levers)} settings, the highest MIoU on simulated frames is {_of(top)}, with"
+        f" {best.kind} data, {words_of(best)}. The same setting has {_of(measured)} on the measured"
+        f" touch-like frames. {len(near)}"
         " settings are within .010 of it on the simulated set; on the measured frames they have"
         f" {_of(means[0])} to {_of(means[-1])}, median {_of(float(np.median(means)))}."
     )

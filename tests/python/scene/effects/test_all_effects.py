@@ -113,7 +113,8 @@ def test_without_effects_the_sheet_is_reciprocal_and_all_kept_together_keep_it(p
 
 @pytest.mark.parametrize("name", sorted(STRONG))
 def test_streams_are_the_effects_own(name, make_session):
-    """It draws from streams of its own name only; without randomness it asks for none."""
+    """An effect draws only from random streams with its own name, and an effect without randomness
+    draws nothing."""
     drawn: list[str] = []
     _, step = _made(name, make_session(drawn=drawn))
     if isinstance(step, VoltageStep):

@@ -118,8 +118,8 @@ def test_a_scene_is_solved_on_the_deformed_sheet_and_contacts():
 
 
 def test_effects_meet():
-    """A bend is the stretch that it says, also beside another and with a phase; frames of a creep
-    differ."""
+    """A bend gives the same frames as the stretch to which it corresponds, also together with
+    another effect and with a phase. Frames of a creep differ."""
     along = bend.lengthening(bend.Parameters(200.0), 12.0, 1.0)
     same = {"strain": along - 1, "sides": "held", "at_s": 0.0}
     other = {"creep": {"strain": 0.1, "time_constant_s": 1.0}, "phase": {}}

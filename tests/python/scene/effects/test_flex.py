@@ -1,5 +1,5 @@
-"""A surface that takes another shape: what is solved, what is refused, and that a scene without it
-neither imports nor computes anything."""
+"""A surface that takes another shape: its solutions, its refusals, and that a scene without it
+neither imports nor computes anything for it."""
 
 import json
 from dataclasses import replace
