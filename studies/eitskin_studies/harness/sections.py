@@ -87,23 +87,29 @@ def fill_readme(readme: Path, results: Path) -> None:
         def number(cell: re.Match[str]) -> str:
             return _number_of(tables, cell[1], cell[2], cell[3])
 
-        text = _placed(text, mark, _CELL.sub(number, part["text"]), readme)
+        text = _placed(text, mark, _wrapped(_CELL.sub(number, part["text"])), readme)
     write_bytes(readme, text.encode("utf-8"))
 
 
 def _number_of(tables: Mapping[str, Tabular], table: str, row: str, column: str) -> str:
-    """A cell of a page's table; of "a / b" the column "first of NAME" is a."""
+    """A cell of a page's table. The column "first of NAME" is a of a cell "a / b" or "a, b". A row
+    is named by its first cell, or by as many as are needed: "after each drive, 0"."""
     where, (part, _, name) = f"{PARTS.name}: README", column.rpartition(" of ")
     if table not in tables:
         raise ConfigError(f"{where}: no table {table!r}; {nearest(table, tables)}")
     head, rows = tables[table]
     if name not in head:
         raise ConfigError(f"{where}: no column {name!r}; {nearest(name, head)}")
-    found = [one for one in rows if one[0] == row]
+    found = [one for one in rows if row in _row_names(one)]
     if len(found) != 1:
         raise ConfigError(f"{where}: {len(found)} rows of {table} are named {row!r}")
     cell = found[0][list(head).index(name)]
-    return cell.split(" / ")[("first", "second").index(part)] if part else cell
+    return re.split(" / |, ", cell)[("first", "second").index(part)] if part else cell
+
+
+def _row_names(cells: Sequence[str]) -> list[str]:
+    """The first cell of a row, the first two, and so on."""
+    return [", ".join(cells[:k]) for k in range(1, len(cells) + 1)]
 
 
 def _placed(text: str, mark: str, content: str, page: Path) -> str:
@@ -127,7 +133,7 @@ def _said(sentence: str, tables: Mapping[str, Tabular], where: str) -> str:
         (head, rows), row, column = tables[match[1]], match[2], match[3]
         if column not in head:
             raise ConfigError(f"{where}: no column {column!r}; {nearest(column, head)}")
-        found = [one for one in rows if row in (", ".join(one[:k]) for k in range(1, len(one) + 1))]
+        found = [one for one in rows if row in _row_names(one)]
         if len(found) > 1:
             raise ConfigError(f"{where}: {len(found)} rows begin with {row!r}; name more cells")
         return _INTERVAL.sub("", found[0][list(head).index(column)]) if found else NOT_MEASURED
@@ -136,10 +142,13 @@ def _said(sentence: str, tables: Mapping[str, Tabular], where: str) -> str:
 
 
 def _wrapped(text: str) -> str:
-    """Lines of at most ``WIDTH``, code spans whole; further lines of a list's entry stand in."""
+    """Lines of at most ``WIDTH``, code spans and lines of tables whole; further lines of a list's
+    entry are indented."""
     whole = re.sub("`[^`]*`", lambda code: code[0].replace(" ", "\0"), text)
     lines = (
-        textwrap.fill(
+        line
+        if line.startswith("|")
+        else textwrap.fill(
             line,
             WIDTH,
             subsequent_indent="  " if line.startswith("- ") else "",
