@@ -605,6 +605,29 @@ TEST(test_frames_of_light_touches_are_solved)
     CHECK(b->fast->news > EITS_FAST_LITTLE_NEWS);
 }
 
+/* Where a touch is off, a frame may find what the skin keeps of it, which is weak. A strong touch
+ * there is a finger: noise ended the one that drives followed. */
+TEST(test_a_strong_touch_where_one_is_off_is_a_finger)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    eits_touch all[EITS_MAX_TOUCHES];
+    eits_real aligned[SMALL_ROWS];
+    drives(b, 8);
+    put(b, 0, 20, 11, 1);
+    drives(b, 40);
+    for (uint32_t strong = 0; strong < 2; ++strong) {
+        eits_touch found = {.x_mm = 20, .y_mm = 11, .explained = 1};
+        found.strength_s_per_m_mm2 = (strong ? R(0.9) : R(0.1)) * b->fast->known[0].peak;
+        uint32_t count = 9;
+        for (uint32_t frame = 0; frame < 2; ++frame) {
+            b->fast->known[0].on = 0;
+            (void)align(b, aligned);
+            CHECK_OK(eits_fast_report(b->fast, &found, 1, all, &count));
+        }
+        CHECK_EQUAL(count, strong);
+    }
+}
+
 /* A frame is not solved while a drive of it waits for an explanation; but it is, as it was
  * measured, while an electrode is named. */
 TEST(test_frames_of_a_named_electrode_are_solved)

@@ -95,7 +95,7 @@ typedef struct eits_fast eits_fast;
     EITS_ALIGN16(                                                                                  \
         (EITS_FAST_STATES * (EITS_FAST_STATES + 1u) + EITS_FAST_TRIALS * EITS_FAST_TRIAL_NUMBERS + \
          EITS_FAST_WAITING * (1u + EITS_FAST_TOUCHES * EITS_FAST_ANSWER_NUMBERS) +                 \
-         16u * EITS_FAST_TOUCHES + EITS_FAST_BODIES * 164u + 96u) *                                \
+         17u * EITS_FAST_TOUCHES + EITS_FAST_BODIES * 164u + 96u) *                                \
             sizeof(eits_real) +                                                                    \
         EITS_MAX_TOUCHES * (sizeof(eits_touch) + 9u * sizeof(eits_real) + 24u) +                   \
         EITS_FAST_TOUCHES * sizeof(eits_fast_touch) + EITS_MAX_ELECTRODES +                        \

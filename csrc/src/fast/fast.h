@@ -134,9 +134,10 @@ struct eits_fast {
         kept_used; /* ids kept at the last alignment; kept_used: 1: one of them was given */
     fast_seen seen[EITS_MAX_TOUCHES];
     eits_fast_touch followed[EITS_FAST_MAX_TOUCHES];
-    /* the places of the touches that were off; there the solver may find what the skin keeps */
+    /* the places of the touches that were off; there the solver may find what the skin keeps, which
+     * is weaker than off_left */
     uint32_t n_off;
-    eits_real off_at[EITS_FAST_MAX_TOUCHES][2];
+    eits_real off_at[EITS_FAST_MAX_TOUCHES][2], off_left[EITS_FAST_MAX_TOUCHES];
     /* touches that drives may find again: their ids, their places, and which were found */
     uint32_t n_expected, expected_id[EITS_MAX_TOUCHES];
     eits_real expected_at[EITS_MAX_TOUCHES][2];

@@ -125,6 +125,7 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
         fast->known[k].aligned = 1;
         eits_copy(fast->known[k].at, fast->state + FAST_SIZE * k, 2);
         if (!fast->known[k].on) {
+            fast->off_left[fast->n_off] = EITS_FAST_ON * fast->known[k].peak;
             eits_copy(fast->off_at[fast->n_off], fast->known[k].at, 2);
             eits_place_on_skin(fast->ctx, fast->off_at[fast->n_off++]);
         }

@@ -314,8 +314,9 @@ static void weigh_places(const eits_fast_touch *followed, eits_touch *found)
 }
 
 /* The touches that drives followed when the frame was aligned; returns their number. Those found
- * that are one of them are taken, and those that a lifted touch has left. Several of them on a
- * palm that was found whole are one. */
+ * that are one of them are taken, and those that a lifted touch has left: these are weak. A
+ * stronger one is a finger, whose touch noise has ended. Several of them on a palm that was found
+ * whole are one. */
 static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, uint32_t count,
                                 uint8_t *taken, eits_touch *touches)
 {
@@ -350,7 +351,7 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
     }
     for (uint32_t k = 0; k < fast->n_off; ++k) {
         const uint32_t n = nearest(fast->off_at[k], (const eits_real(*)[2])at, taken, count);
-        if (n < count)
+        if (n < count && eits_fabs(found[n].strength_s_per_m_mm2) < fast->off_left[k])
             taken[n] = 1;
     }
     return reported;
