@@ -113,6 +113,7 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     int explained = fast->held_count == 0;
     for (uint32_t n = 0; n < fast->drives; ++n)
         explained &= fast->drive[n].explained;
+    const int at_once = fast->news < EITS_FAST_LITTLE_NEWS || fast->faulty;
     fast->n_off = fast->smeared = 0;
     for (uint32_t k = 0; k < fast->count; ++k) {
         /* Tracks that do not explain the drives cannot bring them to one instant. */
@@ -120,7 +121,7 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
         if (has_moved(fast, k, &perhaps) && explained)
             align_touch(fast, k, aligned);
         fast->stirred |= perhaps;
-        fast->smeared |= perhaps && !explained;
+        fast->smeared |= perhaps && !explained && !at_once;
         fast->stirred |= !fast->known[k].on;
         fast->known[k].aligned = 1;
         eits_copy(fast->known[k].at, fast->state + FAST_SIZE * k, 2);
@@ -135,8 +136,7 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     fast->stirred |= !explained;
     fast->drifted = is_far(fast) ? fast->drifted + 1 : 0;
     *state = explained ? (uint32_t)EITS_FAST_EXPLAINED : 0u;
-    if (explained || fast->news < EITS_FAST_LITTLE_NEWS ||
-        fast->unexplained_frames > EITS_FAST_FRAMES || fast->faulty)
+    if (explained || at_once || fast->unexplained_frames > EITS_FAST_FRAMES)
         *state |= (uint32_t)EITS_FAST_TRUSTED;
     fast->aligned = 1;
     fast->news = 0;
