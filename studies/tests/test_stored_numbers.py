@@ -65,7 +65,7 @@ def _rows(title: str) -> list[str]:
 def test_the_measured_numbers_of_each_aim_are_on_the_pages_that_its_line_links_to():
     linked: set[str] = set()
     for row in _rows("Measured against the aims"):
-        # a line without a link goes on with the pages of the line above
+        # a line without a link uses the pages of the line above
         linked = set(re.findall(r"\]\(([^)#]+\.md)", row)) or linked
         known = set()
         for page in (RESULTS / name for name in linked):

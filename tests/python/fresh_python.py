@@ -9,7 +9,7 @@ from pathlib import Path
 import eitskin
 
 MAIN = "import sys\nfrom eitskin.cli.main import main\nsys.exit(main(sys.argv[1:]))\n"
-# a shell's background job has Ctrl-C off, and what it starts too
+# a background job of a shell ignores Ctrl-C, and so do the programs that it starts
 INTERRUPTIBLE = f"import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n{MAIN}"
 
 

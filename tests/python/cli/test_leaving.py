@@ -147,7 +147,7 @@ def test_ctrl_c_ends_it(port, program, state, tmp_path):
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=(tmp_path / "said").open("w"),
-        # a shell's background job has Ctrl-C off, and what it starts too
+        # a background job of a shell ignores Ctrl-C, and so do the programs that it starts
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     end = threading.Event()

@@ -88,7 +88,7 @@ def test_cut_at_any_byte_the_old_model_stays_and_the_next_upload_ends_it(seed):
             assert works(SimBoard(frames(), board.banks), OLD)  # a reboot
     new = zlib.crc32(tiny)
     with sim_device(board) as device:
-        # without a reboot: goes on where it was cut, or begins again
+        # without a reboot the upload continues where it was cut, or begins again
         assert device.board.model_crc in (OLD, new)
         if device.board.model_crc == OLD:
             assert device.upload_model(tiny).model_crc == new

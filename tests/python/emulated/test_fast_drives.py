@@ -11,7 +11,7 @@ from eitskin_emulator.core_on_qemu import PROGRAM, EmulatedRun, run_steps
 from eitskin_emulator.core_steps import Choose, Drives, Load, TareStep
 from scans_in_time import ROW_S, STEP, order
 
-# one finger, then none, then two at once, light ones that are long in doubt, up to six
+# no finger, one, two at once, light ones that stay uncertain for long, up to six
 SCENES = {
     "quiet": (0, 0),
     "one": (0, 1, 1, 1, 0, 0),

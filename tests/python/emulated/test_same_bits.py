@@ -158,8 +158,9 @@ def moving_touches() -> tuple[np.ndarray, np.ndarray]:
     return simulated.untouched_v, simulated.frames_v
 
 
-# with the search: 2.1 to 2.5 million in the mean, and 4.7 at most but for one random scene, whose
-# first fit ends in another minimum, so that it needs the test of touches and a second fit: 12.2
+# With the search, 2.1 to 2.5 million in the mean, and at most 4.7 million, except for one random
+# scene: its first fit ends in another minimum, so that it needs the touch test and a second fit,
+# together 12.2 million.
 MAX_INSTRUCTIONS = {0: 2_300_000, ALL_TOUCH_FIT: 4_800_000}
 MAX_TWO_FITS = 13_000_000
 

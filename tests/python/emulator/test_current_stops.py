@@ -84,7 +84,7 @@ def test_a_program_that_hangs(device):
     hang(board, WFI_LOOP)
     assert 800e3 < opens_after_us(board, 1_000_000) < 950e3
     for timer in board.timers.values():
-        timer.write(0, 4, 0)  # eighty thousand bursts would tell nothing more
+        timer.write(0, 4, 0)  # 80,000 bursts would show nothing more
     restarts_for(board, "watchdog", FaultCode.WATCHDOG, 10)
     device.clear_faults()
     assert not device.info().faults

@@ -164,9 +164,9 @@ def test_after_stop_nothing_is_told(elf):
         (1_500_000, 90, 70, 0),
         (10_000, 100, 10_100, 0),
         (0, 80, 100, RANGE),
-        (800_000, 80, 110, RANGE),  # 27 MHz is no multiple of it
+        (800_000, 80, 110, RANGE),  # 27 MHz is not a multiple of it
         (1_800_000, 90, 70, RANGE),  # faster than the converter
-        (900_000, 80, 100, RANGE),  # the burst is no whole number of microseconds
+        (900_000, 80, 100, RANGE),  # the burst is not a whole number of microseconds
         (1_000_000, 0, 100, RANGE),
         (1_000_000, 1025, 2000, RANGE),
         (1_000_000, 80, 80, RANGE),  # no time between bursts

@@ -23,7 +23,8 @@ from small_models import DATA_KINDS, small, small_blob, small_model
 
 CASE, FRAMES_CASE = "problem/units", "problem/units-of-frames"
 EXPONENTS = tuple(range(-30, 31, 5))
-# |y| whose square float32 holds with 24 bits to spare, and |y|^2 below its end
+# the smallest |y| whose square float32 holds with 24 bits to spare, and the largest whose square
+# is within its range
 MIN_DATA, MAX_DATA = 2.0**-51, 2.0**63
 NOT_FINITE = -15
 

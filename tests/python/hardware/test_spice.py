@@ -93,7 +93,7 @@ BOUNDS = {
     "settling_error_8k5_60pf": (0, 6e-3),
     "demodulation_error": (0, 3e-4),
     "sampling_error": (0, 2e-3),
-    "dead_line_a": (0, 5e-3),  # a processor's pin and a multiplexer's input bear more than 20 mA
+    "dead_line_a": (0, 5e-3),  # pin and input withstand more than 20 mA
     "supply_good_v": (0.7 * 3.3, 3.3),  # the processor's input levels
     "supply_lost_v": (0, 0.3 * 3.3),
     "supply_lost_minus_v": (0, 0.3 * 3.3),

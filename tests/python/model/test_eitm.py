@@ -239,7 +239,7 @@ def meta(content: bytes) -> bytes:
     return sealed(bytes(whole), total=len(whole))
 
 
-# where in a section which number is wrong, and what is said of it
+# by section: offset, format and value of a wrong number, and the error that names it
 WRONG = {
     "DIMS": (0, "<I", 0, "holds a dimension out of range; build the model again"),
     "PROT": (0, "<4B", (0, 0, 0, 0), "protocol: row 0 (from 0) is [0, 0, 0, 0]: a pair needs two"

@@ -92,7 +92,7 @@ def test_misplacement_moves_electrodes_along_the_rim(make_session):
     away = np.linalg.norm(after.electrode_centres_mm(), axis=1)
     np.testing.assert_allclose(away, 97.0, rtol=1e-12)
     assert after.outline == before.outline and after.electrodes.width_mm == 4.0
-    # one electrode alone, by so much, and the others not at all
+    # only one electrode is shifted, by 2.5 mm
     one = misplacement.shifted(before, np.eye(16)[5] * 2.5)
     moved = np.linalg.norm(one.electrode_centres_mm() - before.electrode_centres_mm(), axis=1)
     assert np.flatnonzero(moved > 1e-9).tolist() == [5]
