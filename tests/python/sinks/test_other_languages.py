@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from ports import free_port
 from swipe_frames import Swipe
 
 from eitskin.session.message import encoded, schema
@@ -38,12 +39,6 @@ int main()
 """
 
 
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 def ran(command: list[str], text: str = "") -> str:
     done = subprocess.run(command, input=text, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -52,7 +47,7 @@ def ran(command: list[str], text: str = "") -> str:
 
 def test_javascript_prints_the_touches_of_a_stream(swipe: Swipe):
     """A datagram goes when the one before was printed, so that none is lost on a busy machine."""
-    port, ids = free_port(), set[int]()
+    port, ids = free_port(socket.SOCK_DGRAM), set[int]()
     command = ["node", str(EXAMPLES / "javascript" / "touches.mjs"), str(port)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as program:
         assert program.stdout is not None

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
+from ports import free_port
 from swipe_frames import Swipe
 
 import eitskin
@@ -33,12 +34,6 @@ SUMMARY = {
 }  # fmt: skip
 WAIT_S = 20.0
 VALID = Draft202012Validator(schema())
-
-
-def free_port(kind: int = socket.SOCK_STREAM) -> int:
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def send(swipe: Swipe, url: str) -> None:
