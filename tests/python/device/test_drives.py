@@ -86,7 +86,7 @@ def test_they_are_told_soon_where_they_are_and_how_fast(recorded):
 
 @pytest.mark.parametrize(
     ("x_mm", "y_mm", "from_s"),
-    [(37.48, -10.13, 0.0125), (-27.9, 14.6, 0.002), (-24.2, 19.9, 0.0125)],
+    [(37.48, -10.13, 0.0125), (-27.9, 14.6, 0.002), (-17.1, 29.5, 0.002)],
 )
 def test_a_palm_that_lands_slowly_is_one_touch_in_its_place(tmp_path, x_mm, y_mm, from_s):
     place = f"x_mm = {x_mm}, y_mm = {y_mm}"
@@ -112,7 +112,9 @@ snr_db = 60.0
     touches = [one for item in told for one in item.touches]
     assert len(touches) > 80
     assert max(np.hypot(one.x_mm - x_mm, one.y_mm - y_mm) for one in touches) < 12
-    assert max(len(item.touches) for item in told if isinstance(item, Frame)) == 1
+    frames = [item.touches for item in told if isinstance(item, Frame) and item.touches]
+    assert max(len(touches) for touches in frames) == 1
+    assert max(np.hypot(one.x_mm - x_mm, one.y_mm - y_mm) for (one,) in frames) < 8
 
 
 def test_their_messages_keep_to_the_schema(recorded):
