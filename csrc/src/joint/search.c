@@ -230,7 +230,7 @@ static int try_strong(eits_context *ctx, eits_joint *j, uint64_t *macs)
 {
     uint32_t turned = 0, rounds = 1;
     for (uint32_t k = 0; k < j->count; ++k) {
-        if (!eits_joint_is_light(&j->shape[k]))
+        if (!eits_joint_is_light(&j->shape[k]) || *macs > j->most)
             continue;
         eits_joint_free_one(j, k);
         *macs += eits_joint_hold(ctx, j, rounds);

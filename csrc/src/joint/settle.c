@@ -62,9 +62,9 @@ void eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_join
     if (j->parameters == EITS_JOINT_DISC) {
         const eits_joint discs = *j;
         if (j->count * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS &&
-            j->misfit > folds + EITS_JOINT_FITS && 3u * (*macs - begin) < most)
+            j->misfit > folds + EITS_JOINT_FITS && 3u * (*macs - begin) < most && *macs < j->most)
             try_ellipses(ctx, j, macs);
-        if (may_miss(ctx, j))
+        if (may_miss(ctx, j) && *macs < eits_joint_limit(ctx, j, UINT64_MAX))
             try_search(ctx, scratch, j, &discs, macs);
     }
     if (eits_joint_excess(ctx, j) < EITS_JOINT_LOST)
