@@ -2,11 +2,15 @@
  * search; drives may have come since. */
 #include "search/search.h"
 
-/* All drives of the trial, and those since, are explained, and wait no more. */
+/* All drives of the trial, and those since, are explained, and wait no more. The present drive is
+ * counted later. */
 static void end(eits_fast *fast, const fast_trial *trial)
 {
-    for (uint32_t n = fast->search.from + trial->from; n < fast->ring_count; ++n)
+    for (uint32_t n = fast->search.from + trial->from; n < fast->ring_count; ++n) {
         fast->drive[fast->ring[n]->drive].explained = 1;
+        if (n + 1 < fast->ring_count)
+            fast->unexplained &= ~(1u << (fast->ring_count - n - 2));
+    }
     eits_fast_empty_ring(fast);
 }
 

@@ -74,11 +74,11 @@
 
 /* the work that a drive may spend on a search [answers of a place in a drive]. larger: single
  * drives take longer; smaller: searches take more drives */
-#define EITS_FAST_ANSWERS 32
+#define EITS_FAST_ANSWERS 33
 
 /* that work is less by this for each known touch, which needs work of its own [answers]. as
  * FAST_ANSWERS */
-#define EITS_FAST_TOUCH_ANSWERS 5
+#define EITS_FAST_TOUCH_ANSWERS 6
 
 /* the cost of adding a drive to the map [answers]. larger: fewer pieces of a search per drive;
  * smaller: single drives take longer than FAST_ANSWERS says */
@@ -159,6 +159,10 @@
 /* the same for two touches at once, and beside a young touch [decisions]. as FAST_STABLE */
 #define EITS_FAST_STABLE_CROWD 3
 
+/* one decision is enough if it explains at least this many drives and nothing is left to explain
+ * [drives]. larger: later starts while further fingers land; smaller: false touches */
+#define EITS_FAST_STABLE_DRIVES 4
+
 /* two decisions with places within this distance are for the same touch [mm]. as FAST_STABLE */
 #define EITS_FAST_STABLE_MM R(4.0)
 
@@ -212,6 +216,10 @@
 /* least speed of a known touch that turns out to be faster than assumed [mm/s]. as
  * FAST_SWIFT_SPEED */
 #define EITS_FAST_SWERVE_SPEED R(100.0)
+
+/* a known touch that turns out to be further away than this is assumed to move [mm]. larger: swipes
+ * lag behind; smaller: a touch that was born at a wrong place runs away */
+#define EITS_FAST_JUMPED_MM R(5.0)
 
 /* two touches at once are tried at this distance on either side of one place [mm]. half of the
  * distance of near fingers */

@@ -1,7 +1,8 @@
 /* This file decides which hypothesis is acted on. A cost is in chi^2: what the hypothesis leaves,
  * and a price for each number that was free. A wrong touch is worse than a late one, so that a
  * birth must beat each move and change of known touches by a margin, explain the drives to noise,
- * leave no rival, and come out twice; whatever is not clear waits for more drives. */
+ * leave no rival, and come out twice unless it explains several drives clearly; whatever is not
+ * clear waits for more drives. */
 #include "search/search.h"
 
 static const eits_real HUGE_COST = R(1e30);
@@ -121,7 +122,7 @@ static int is_stable(eits_fast *fast, const fast_trial *trial)
     const int first_of_all = fast->count == 0 && trial->fresh == 1;
     uint32_t need = crowd ? EITS_FAST_STABLE_CROWD : EITS_FAST_STABLE;
     if (eits_is_clear(fast, trial, trial->fresh))
-        need = first_of_all ? 1 : EITS_FAST_STABLE;
+        need = first_of_all || trial->count >= EITS_FAST_STABLE_DRIVES ? 1 : EITS_FAST_STABLE;
     if (s->last_times < need)
         return 0;
     s->last_count = 0;

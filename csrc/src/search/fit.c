@@ -28,11 +28,23 @@ void eits_trial_add_new(fast_trial *trial, const eits_real *place, int moves)
                     .tight = {0, 1 / fast_square(2 * EITS_FAST_MOVE_SPEED)}};
 }
 
+eits_real eits_waited_s(const eits_fast *fast, const fast_trial *trial)
+{
+    uint32_t drives = 1; /* with the present one */
+    for (uint32_t bits = fast->unexplained; (bits & 1u) != 0; bits >>= 1)
+        ++drives;
+    const uint32_t own = fast->ring_count - fast->search.from - trial->from;
+    return drives > own ? (eits_real)(drives - own) * EITS_FAST_DRIVE_S : 0;
+}
+
 void eits_trial_add_known(const eits_fast *fast, fast_trial *trial, uint32_t k)
 {
-    /* a later beginning leaves more room for what came before it */
-    const eits_real late = fast_between_s(fast->ring[fast->search.from]->time_us,
-                                          search_drive(fast, trial, 0)->time_us);
+    /* A later beginning leaves more room for what came before it. A touch that rests has not gone
+     * on since drives were last explained; another one has. */
+    const eits_real late = search_rests(fast, k)
+                               ? fast_between_s(fast->ring[fast->search.from]->time_us,
+                                                search_drive(fast, trial, 0)->time_us)
+                               : eits_waited_s(fast, trial);
     const eits_real offset = EITS_FAST_MOVE_MM + R(0.3) * EITS_FAST_MOVE_SPEED * late;
     const int turns = fast->known[k].moving || search_rests(fast, k);
     const eits_real speed = turns ? EITS_FAST_TURN_SPEED : EITS_FAST_MOVE_SPEED;

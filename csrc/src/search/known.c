@@ -125,16 +125,18 @@ static uint32_t cost_of_replace(const eits_fast *fast)
                : 0;
 }
 
-/* A new touch in place of a known one, from `place` on. */
+/* A new touch in place of a known one, from `place` on; with `speed`, one that moves. */
 static void look_instead(eits_fast *fast, uint32_t k, const eits_real *place, eits_real rho2,
-                         int moves)
+                         const eits_real *speed)
 {
     fast_trial *trial = &fast->search.scratch;
     eits_trial_begin(fast, trial, fast->search.count);
-    eits_trial_add_new(trial, place, moves);
+    eits_trial_add_new(trial, place, speed != NULL);
+    if (speed != NULL)
+        eits_copy(trial->body[0].p + 2, speed, 2);
     trial->gone = (uint8_t)k;
     trial->rho2 = rho2;
-    trial->as_known = !moves && rho2 == fast->known[k].rho2;
+    trial->as_known = speed == NULL && rho2 == fast->known[k].rho2;
     (void)eits_trial_say(fast, trial);
     eits_trial_refine(fast, trial, 2);
 }
@@ -151,12 +153,26 @@ static int is_near(const eits_fast *fast, int moves)
     return far < fast_square(most);
 }
 
-/* Strengths that jump from what they were cost; so do another width and a speed. */
+/* Whether a touch is so far from where it was that it has moved there: a finger that swipes is
+ * found so, if its drives were left unexplained for a while. A touch that has just landed may have
+ * been at a wrong place, as that of a palm that still rises. */
+static int has_jumped(const eits_fast *fast, const fast_trial *trial)
+{
+    const uint32_t k = trial->gone;
+    const fast_known *known = &fast->known[k];
+    return (known->moving || known->age > EITS_FAST_YOUNG / 2) && trial->rho2 == known->rho2 &&
+           fast_distance2(trial->body[0].p, fast->state + (size_t)FAST_SIZE * k) >
+               fast_square(EITS_FAST_JUMPED_MM);
+}
+
+/* Strengths that jump from what they were cost; so do another width, a speed, and a jump without a
+ * speed. */
 static eits_real cost_of_instead(const eits_fast *fast, const fast_trial *trial)
 {
     const fast_known *known = &fast->known[trial->gone];
     const eits_real wider = trial->rho2 != known->rho2 ? R(4) : R(0);
-    eits_real cost = trial->left + wider + (trial->body[0].numbers == 4 ? R(6) : R(0));
+    const int moves = trial->body[0].numbers == 4;
+    eits_real cost = trial->left + wider + (moves != has_jumped(fast, trial) ? R(6) : R(0));
     for (uint32_t n = 0; n < trial->count; ++n) {
         const eits_real before = search_drive(fast, trial, n)->state[trial->gone][FAST_C];
         const eits_real change =
@@ -179,7 +195,7 @@ static void look_for_place(eits_fast *fast)
 {
     uint32_t k;
     if (eits_search_near(fast, &k))
-        look_instead(fast, k, fast->state + FAST_SIZE * k, fast->known[k].rho2, 0);
+        look_instead(fast, k, fast->state + FAST_SIZE * k, fast->known[k].rho2, NULL);
 }
 
 static void end_instead(eits_fast *fast)
@@ -195,11 +211,19 @@ static uint32_t cost_of_swerve(const eits_fast *fast)
     return wanted ? fast->search.count : 0;
 }
 
+/* A touch that has jumped starts with the speed that brought it there from where drives were last
+ * explained. */
 static void look_for_swerve(eits_fast *fast)
 {
     const fast_trial *still = search_trial(fast, FAST_REPLACE);
     const uint32_t k = still->gone;
-    look_instead(fast, k, still->body[0].p, fast->known[k].rho2, 1);
+    const eits_real *to = still->body[0].p, *from = fast->state + (size_t)FAST_SIZE * k;
+    const eits_real took_s =
+        eits_waited_s(fast, still) + (eits_real)still->count * EITS_FAST_DRIVE_S;
+    eits_real speed[2] = {0, 0};
+    for (uint32_t axis = 0; axis < 2 && has_jumped(fast, still); ++axis)
+        speed[axis] = (to[axis] - from[axis]) / took_s;
+    look_instead(fast, k, to, fast->known[k].rho2, speed);
 }
 
 static void end_swerve(eits_fast *fast)
@@ -211,8 +235,9 @@ static void end_swerve(eits_fast *fast)
         return;
     const eits_real *p = trial->body[0].p;
     const eits_real speed2 = fast_square(p[2]) + fast_square(p[3]);
-    const eits_real doubt = 9 * (covariance[2][2] + covariance[3][3]);
-    if (trial->left + 6 < still->left &&
+    const int jumped = has_jumped(fast, still);
+    const eits_real doubt = jumped ? 0 : 9 * (covariance[2][2] + covariance[3][3]);
+    if ((jumped || trial->left + 6 < still->left) &&
         speed2 > eits_larger(doubt, fast_square(EITS_FAST_SWERVE_SPEED)) &&
         speed2 < fast_square(EITS_FAST_SPEED_MOST))
         keep_better(fast, trial);
@@ -232,7 +257,7 @@ static void try_wider(eits_fast *fast, eits_real rho)
     uint32_t k;
     fast->search.scratch.exists = 0;
     if (eits_search_near(fast, &k) && fast_square(rho) != fast->known[k].rho2)
-        look_instead(fast, k, fast->state + FAST_SIZE * k, fast_square(rho), 0);
+        look_instead(fast, k, fast->state + FAST_SIZE * k, fast_square(rho), NULL);
 }
 
 static void try_wide(eits_fast *fast)

@@ -86,6 +86,8 @@ int eits_search_clear(const eits_fast *fast);
 void eits_trial_begin(const eits_fast *fast, fast_trial *trial, uint32_t count);
 void eits_trial_add_new(fast_trial *trial, const eits_real *place, int moves);
 void eits_trial_add_known(const eits_fast *fast, fast_trial *trial, uint32_t k);
+/* Return the time in which nothing was explained before the first drive of the trial, s. */
+eits_real eits_waited_s(const eits_fast *fast, const fast_trial *trial);
 /* Compute how the trial explains its drives. Returns 0 if a place is off the skin. */
 int eits_trial_say(eits_fast *fast, fast_trial *trial);
 /* Ask for up to `steps` damped Gauss-Newton steps from the trial's present parameters, for which

@@ -115,3 +115,13 @@ def test_two_fingers_that_cross_stay_two(solved):
         places = (here, here, there, there)
         paths.append([(t, *at, 1.0) for t, at in zip(times, places, strict=True)])
     assert _false(solved["presses"], paths) == (0, {1, 2})
+
+
+def test_a_finger_that_swipes_is_not_left_behind(solved):
+    """It stays 40 ms where it lands, then goes off at 1 m/s at once. At most 5 reports, of 6 ms,
+    have it elsewhere."""
+    times = (0.0569, 0.0969, 0.1846)
+    places = ((-39.0, 16.0), (-39.0, 16.0), (35.0, -31.0))
+    path = [(t, *at, 1.0) for t, at in zip(times, places, strict=True)]
+    false, ids = _false(solved["presses"], [path])
+    assert false <= 5 and ids == {1}
