@@ -16,10 +16,11 @@ from eitskin.session.settings import SessionSettings
 
 TOKEN = "a word for tests"
 FLAGS = (
-    "--headless=new --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader"
-    " --disable-quic --no-first-run --disable-background-networking"
+    "--headless=new --no-sandbox --disable-quic --no-first-run --disable-background-networking"
     " --disable-component-update --disable-sync"
 )
+WITH_WEBGL = " --use-angle=swiftshader --enable-unsafe-swiftshader"
+WITHOUT_WEBGL = " --disable-gpu"  # what is drawn in two dimensions is drawn faster so
 ALL = Stream.RAW | Stream.IMAGE | Stream.TOUCHES
 
 
@@ -54,9 +55,9 @@ def serving(url: str, mode: Stream = ALL, **more: Any) -> Iterator[PageServer]:
 class Page:
     """The live page in a browser, with what a user sees and does."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, webgl: bool = False) -> None:
         options = webdriver.ChromeOptions()
-        for flag in FLAGS.split():
+        for flag in (FLAGS + (WITH_WEBGL if webgl else WITHOUT_WEBGL)).split():
             options.add_argument(flag)
         options.add_argument(f"--user-data-dir={folder}")
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})

@@ -57,7 +57,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory) -> Iterator[Page]:
-    one = Page(tmp_path_factory.mktemp("chromium"))
+    one = Page(tmp_path_factory.mktemp("chromium"), webgl=True)
     try:
         one.size(1200, 900)
         yield one
