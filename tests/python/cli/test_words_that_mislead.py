@@ -112,8 +112,8 @@ def test_open_device_honours_the_speed():
     def took(url: str) -> float:
         with open_device(url) as device:
             device.tare()
-            device.start_scene()
             began = time.monotonic()
+            device.start_scene()
             assert sum(1 for _ in device.stream(frames=6)) >= 6
             return time.monotonic() - began
 

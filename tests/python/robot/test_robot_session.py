@@ -126,12 +126,11 @@ def test_a_robot_is_recorded_in_a_folder_and_replayed(arm, tmp_path, capsys):
 
 
 def test_a_robot_keeps_its_speed(arm):
-    began = time.monotonic()
-    with open_session(f"{arm}?speed=1", SessionSettings(frames=6)) as session:
+    with open_session(f"{arm}?speed=0.5", SessionSettings(frames=6)) as session:
         session.start()
-        began = time.monotonic()
+        began = time.monotonic()  # on a busy machine, some time after the scene's beginning
         assert sum(isinstance(one, Frame) for one in session.messages()) == 18
-    assert time.monotonic() - began > 0.24  # of 0.25 s
+    assert time.monotonic() - began > 0.35  # of 0.5 s
 
 
 def test_a_loop_goes_on_until_it_is_stopped(arm):

@@ -242,21 +242,17 @@ def test_one_iterator_in_two_threads():
     with opened("on a port") as board, ThreadPoolExecutor(1, thread_name_prefix="reader") as pool:
         frames = board.stream(Stream.RAW)
         next(frames)
-        refused, reading = threading.Event(), threading.Event()
-        board.record(lambda packet: refused.wait(10))  # nothing comes meanwhile
+        refused, held = threading.Event(), threading.Event()
+        board.record(lambda packet: (held.set(), refused.wait(30)))  # nothing comes meanwhile
 
-        def read() -> list[object]:
-            reading.set()
-            return [next(frames) for _ in range(3)]
-
-        waits = pool.submit(read)
-        reading.wait()
-        time.sleep(0.1)  # it is inside of  next  then
+        waits = pool.submit(lambda: [next(frames) for _ in range(3)])
+        assert held.wait(30)
+        time.sleep(0.1)  # until it has read what came before, and is inside of  next
         for use in (frames.__next__, frames.close):  # type: ignore[attr-defined]
             with pytest.raises(UsageError, match="read by thread 'reader_0'; end the loop"):
                 use()
         refused.set()
-        assert len(waits.result(10)) == 3
+        assert len(waits.result(30)) == 3
         board.record(None)
 
 
