@@ -76,6 +76,9 @@ WORLDS = {
     "two_fingers_12_to_16_mm": World((2, 2), (5.0, 8.0), pair_mm=(12.0, 16.0), **FINGERS),
     "eight_at_4_radii": World(**EIGHT, **LOW_NOISE),
     "eight_mild_errors": World(**EIGHT, **LOW_NOISE, **MILD),
+    "crowd_on_an_uneven_skin": World(
+        (9, 12), (5.0, 9.0), spacing_radii=2.5, uneven=0.1, drift=0.01
+    ),
     "uneven_20_percent": World(uneven=0.2),
     "misplaced_3_mm": World(misplaced_mm=3.0),
     "out_of_round_2_percent": World(out_of_round=0.02),

@@ -24,9 +24,11 @@ from eitskin.scene.random_touches import TouchScene, TouchSet, TrueTouch
 from eitskin.scene.simulate import simulate
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
+from eitskin.solve.reconstructor import Reconstructor
 from eitskin.teaching.teach import teach
 from eitskin_emulator.core_on_qemu import PROGRAM, EmulatedFrame, run_frames
 from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
+from other_worlds import WorldFactory
 from simulated_presses import SKIN, presses
 from small_models import session as simulated_session
 from small_models import small, small_blob, small_model
@@ -159,10 +161,9 @@ def moving_touches() -> tuple[np.ndarray, np.ndarray]:
 
 
 # With the search, 2.1 to 2.5 million in the mean, and at most 4.7 million, except for one random
-# scene: its first fit ends in another minimum, so that it needs the touch test and a second fit,
-# together 12.2 million.
+# scene, which takes 6.5 million.
 MAX_INSTRUCTIONS = {0: 2_300_000, ALL_TOUCH_FIT: 4_800_000}
-MAX_TWO_FITS = 13_000_000
+MAX_HARD_SCENE = 7_000_000
 
 
 @pytest.mark.parametrize("warm", [False, True])
@@ -186,7 +187,34 @@ def test_what_a_frame_costs_at_most(program, tmp_path, warm, touch_fit):
         assert all(result.touches[0] in "123" for result in board)
         most = sorted(costs)
         assert most[-2] <= MAX_INSTRUCTIONS[touch_fit]
-        assert most[-1] <= (MAX_TWO_FITS if touch_fit else MAX_INSTRUCTIONS[touch_fit])
+        assert most[-1] <= (MAX_HARD_SCENE if touch_fit else MAX_INSTRUCTIONS[touch_fit])
+
+
+BUDGET = 31_000 * 104  # TOUCH_WORK of tables/constants.toml, for the folds of the paper's skin
+# Steps that have begun are completed, and some looks are made in every frame.
+MAX_OVER_BUDGET = 1.3
+MAX_INSTRUCTIONS_PER_MAC = 6.0
+
+
+def test_the_touches_of_a_crowd_stay_within_their_budget(program, same_everywhere, tmp_path):
+    """Five frames of nine to twelve touches on an uneven skin that has drifted are made to be
+    expensive. The most expensive one has the same bits on the Cortex-M7."""
+    model, blob = load_prebuilt()
+    crowd = WorldFactory(model.skin, model.protocol, 3000).scenes("crowd_on_an_uneven_skin", 5, 1)
+    macs = []
+    for untouched_v, frame_v in zip(crowd.untouched_v, crowd.frames_v, strict=True):
+        reconstructor = Reconstructor(model, blob=blob)
+        reconstructor.tare(untouched_v)
+        macs.append(reconstructor.reconstruct(frame_v).info.touch_macs)
+    worst = int(np.argmax(macs))
+    assert BUDGET < max(macs) <= MAX_OVER_BUDGET * BUDGET
+    frames = crowd.untouched_v[worst], crowd.frames_v[worst : worst + 1]
+    (found,) = same_everywhere(blob, *frames)
+    assert found.info.touch_macs == max(macs)
+    assert "crowded" in found.info.diagnostics_by_name
+    (board,) = run(program, tmp_path, blob, *frames, default_options(model))
+    print(f"{max(macs)} multiply-accumulates, {board.touch_instructions} instructions")
+    assert board.touch_instructions <= MAX_INSTRUCTIONS_PER_MAC * MAX_OVER_BUDGET * BUDGET
 
 
 def in_storage(model: Model, storage: str) -> bytes:
