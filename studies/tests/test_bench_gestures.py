@@ -1,18 +1,28 @@
 """Gestures drawn, simulated, reported and judged."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from eitskin.core.diagnostics_table import Touch
 from eitskin.core.gestures import Gestures
 from eitskin.model.prebuilt import load_prebuilt
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.gestures import bench
-from eitskin_studies.gestures.drawn import EACH, KINDS, RIM_MM, DrawnGesture, DrawnSession
+from eitskin_studies.gestures.drawn import (
+    EACH,
+    KINDS,
+    RIM_MM,
+    DrawnGesture,
+    DrawnSession,
+    Finger,
+)
 from eitskin_studies.gestures.drawn import draw_session as draw
 from eitskin_studies.gestures.judged import GestureCount, ReportedGesture, judge, reported_gestures
-from eitskin_studies.gestures.simulated import RATE_HZ, Simulator, found_touches
+from eitskin_studies.gestures.simulated import RATE_HZ, Simulator, TouchedFrame, found_touches
+from eitskin_studies.gestures.stages import STAGES, failed_stage
 
 
 def test_a_session_has_every_kind_within_the_skin_and_depends_on_its_seed_alone():
@@ -76,3 +86,33 @@ def test_what_is_right_and_what_is_invented(kinds, what, right, invented):
     count = GestureCount()
     count.add(judge(done(*kinds), what))
     assert (count.right_gestures, dict(count.invented)) == (right, invented)
+
+
+@pytest.mark.parametrize(
+    ("stage", "shown"),
+    [
+        (0, []),
+        (0, [(k, 60.0, 1) for k in range(48)]),  # elsewhere
+        (1, [(k, 1.0, 1) for k in range(6, 48)]),
+        (2, [(k, 1.0, 1) for k in range(48) if not 20 <= k < 23]),
+        (3, [(k, 1.0, 1 + (k > 20)) for k in range(48)]),
+        (4, [(k, 1.0, 1) for k in range(48)] + [(9, 50.0, 2)]),
+        (5, [(k, 5.0, 1) for k in range(48)]),
+        (6, [(k, 1.0, 1) for k in range(48)]),
+    ],
+)
+def test_the_stage_at_which_a_gesture_failed(stage, shown):
+    """A finger rests at 0 for a second; `shown`: frame, error in mm and id of each touch."""
+    finger = Finger(np.array([0.0, 1.0]), np.zeros((2, 2)), 7.0, 8.0, 0.02)
+    one = DrawnGesture("hold", (finger,), 0.0, 1.0)
+    touch = Touch(id=0, x_mm=0.0, y_mm=0.0, radius_mm=7.0, strength_s_per_m_mm2=2.0, explained=1.0)
+    frames = [
+        TouchedFrame(
+            round(k * 1e6 / RATE_HZ),
+            tuple(replace(touch, id=i, x_mm=mm) for at, mm, i in shown if at == k),
+        )
+        for k in range(50)
+    ]
+    assert failed_stage(one, frames) == STAGES[stage]
+    session = DrawnSession("made", (one,), 1.0)
+    assert judge(session, [], frames).stages == {STAGES[stage]: 1}

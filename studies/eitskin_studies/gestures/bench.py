@@ -15,6 +15,7 @@ from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.gestures.drawn import EACH, KINDS, NONE, draw_session
 from eitskin_studies.gestures.judged import GestureCount, judge, reported_gestures
 from eitskin_studies.gestures.simulated import ELEMENTS, RATE_HZ, Simulator, found_touches
+from eitskin_studies.gestures.stages import STAGES
 from eitskin_studies.harness.sections import Filling, Tabular, text_table
 
 ROLES = ("tuning", "judging")
@@ -64,7 +65,7 @@ def run(settings: Settings, progress: Progress = silent) -> GestureBench:
         exact_v = simulator.exact_v(session, settings.seed)
         for snr, count in counts.items():
             frames = found_touches(skin, exact_v, snr, settings.seed, session.name)
-            count.add(judge(session, reported_gestures(frames, Gestures())))
+            count.add(judge(session, reported_gestures(frames, Gestures()), frames))
     return GestureBench(settings, counts)
 
 
@@ -155,9 +156,14 @@ def _confusion(bench: GestureBench) -> Tabular:
     return ["what was done", *(f"{snr:g} dB: reported, times" for snr in bench.counts)], rows
 
 
+def _stages(bench: GestureBench) -> Tabular:
+    rows = [[stage, *(str(c.stages[stage]) for c in bench.counts.values())] for stage in STAGES]
+    return ["what failed", *(f"{snr:g} dB: gestures" for snr in bench.counts)], rows
+
+
 def as_text(bench: GestureBench) -> str:
     """For a terminal."""
-    parts = (_summary(bench), _by_kind(bench), _confusion(bench))
+    parts = (_summary(bench), _by_kind(bench), _confusion(bench), _stages(bench))
     return "\n\n".join(text_table(*part) for part in parts)
 
 
@@ -171,5 +177,6 @@ def for_page(bench: GestureBench, command: str) -> Filling:
     )
     tables = {
         "summary": _summary(bench), "kinds": _by_kind(bench), "confusion": _confusion(bench),
+        "stages": _stages(bench),
     }  # fmt: skip
     return {"gestures-run": text}, tables

@@ -8,6 +8,7 @@ from eitskin.core.gestures import Gestures
 from eitskin.core.gestures_table import EventKind, EventPhase
 from eitskin_studies.gestures.drawn import DrawnGesture, DrawnSession
 from eitskin_studies.gestures.simulated import RATE_HZ, TouchedFrame
+from eitskin_studies.gestures.stages import failed_stage
 
 # of a gesture: what must be reported, in this order
 EXPECTED = {
@@ -40,7 +41,8 @@ class ReportedGesture:
 class GestureCount:
     """Counts of one session, or of several added up: ``done`` gestures of each kind, ``right``
     ones, ``invented`` ones that no gesture accounts for, ``reported`` in all, gestures by whether a
-    finger is light, what was taken for what, and the latency in s of each right one."""
+    finger is light, what was taken for what, at which stages gestures and others failed, and the
+    latency in s of each right one."""
 
     done: Counter[str] = field(default_factory=Counter)
     right: Counter[str] = field(default_factory=Counter)
@@ -49,6 +51,7 @@ class GestureCount:
     light: Counter[bool] = field(default_factory=Counter)
     light_right: Counter[bool] = field(default_factory=Counter)
     taken_for: Counter[tuple[str, str]] = field(default_factory=Counter)
+    stages: Counter[str] = field(default_factory=Counter)
     late_s: dict[str, list[float]] = field(default_factory=dict)
 
     @property
@@ -70,6 +73,7 @@ class GestureCount:
         self.light += other.light
         self.light_right += other.light_right
         self.taken_for += other.taken_for
+        self.stages += other.stages
         for kind, late in other.late_s.items():
             self.late_s.setdefault(kind, []).extend(late)
 
@@ -90,9 +94,14 @@ def reported_gestures(frames: Iterable[TouchedFrame], gestures: Gestures) -> lis
     return reported
 
 
-def judge(session: DrawnSession, reported: Sequence[ReportedGesture]) -> GestureCount:
+def judge(
+    session: DrawnSession,
+    reported: Sequence[ReportedGesture],
+    frames: Sequence[TouchedFrame] = (),
+) -> GestureCount:
     """Each reported gesture belongs to the gesture in whose time it was recognised. A gesture is
-    right where exactly what is expected was reported, and a swipe's direction fits."""
+    right where exactly what is expected was reported, and a swipe's direction fits. With the
+    ``frames`` from which it was reported, the stages at which the others failed are counted."""
     count, rest = GestureCount(reported=len(reported)), list(reported)
     for one in session.gestures:
         mine = [t for t in rest if one.start_s <= t.first_s <= _until(one) + SLACK_S]
@@ -105,6 +114,8 @@ def judge(session: DrawnSession, reported: Sequence[ReportedGesture]) -> Gesture
             count.light[one.is_light] += 1
             count.light_right[one.is_light] += right
         count.taken_for[one.kind, " + ".join(kinds) or "nothing"] += 1
+        if not right and frames:
+            count.stages[failed_stage(one, frames)] += 1
         surplus = Counter(kinds) - Counter(wanted)
         count.invented += surplus
         if right and mine:

@@ -116,6 +116,6 @@ def found_touches(
         try:
             touches = skin.follow(frame, (number + place) / RATE_HZ).touches
         except FrameError:
-            touches = ()
+            continue  # a stream makes no events of a rejected frame
         reported.append(TouchedFrame(round(number * 1e6 / RATE_HZ), touches))
     return reported
