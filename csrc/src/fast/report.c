@@ -318,7 +318,7 @@ static void weigh_places(const eits_fast_touch *followed, eits_touch *found)
  * stronger one is a finger, whose touch noise has ended. Several of them on a palm that was found
  * whole are one. */
 static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, uint32_t count,
-                                uint8_t *taken, eits_touch *touches)
+                                int smeared, uint8_t *taken, eits_touch *touches)
 {
     eits_real at[EITS_MAX_TOUCHES][2];
     for (uint32_t n = 0; n < count; ++n) {
@@ -339,11 +339,15 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
             n < count && fast_distance2(at[n], place) < fast_square(EITS_FAST_AGREE_MM);
         /* where the two differ, the frame's place is the better one; but of a palm it has discs */
         const int palm = fast_is_palm(fast_square(EITS_FAST_SOFT_RADIUS * t->radius_mm));
-        const int shown = agrees || (n < count && !palm);
+        const int shown = !smeared && (agrees || (n < count && !palm));
         eits_touch *touch = &touches[reported++];
         *touch = shown ? found[n] : alone(fast, t);
         if (shown)
             weigh_places(t, touch);
+        if (smeared && n < count) {
+            touch->explained = found[n].explained;
+            touch->confidence = found[n].confidence;
+        }
         touch->id = t->id;
         touch->confirmed = agrees || t->confirmed;
         if (n < count)
@@ -454,16 +458,13 @@ eits_status eits_fast_report(eits_fast *fast, const eits_touch *found, uint32_t 
         return EITS_E_ARGUMENT;
     const int drives = fast->aligned != 0;
     fast->aligned = *count = 0;
-    if (drives && is_smeared(fast, found, n_found)) {
-        found = NULL;
-        n_found = 0;
-    }
+    const int smeared = drives && is_smeared(fast, found, n_found);
     uint32_t followed = 0;
     if (drives) {
         forget_followed(fast);
-        followed = *count = report_followed(fast, found, n_found, taken, touches);
+        followed = *count = report_followed(fast, found, n_found, smeared, taken, touches);
     }
-    if (found != NULL) {
+    if (found != NULL && !smeared) {
         for (uint32_t n = 0; n < n_found; ++n) {
             if (!taken[n] && !(drives && is_rest(fast, &found[n])))
                 rest[n_rest++] = found[n];
