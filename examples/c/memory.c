@@ -15,14 +15,44 @@ static const size SIZES[] = {
     {"32 electrodes", 32, 928, 464, 128, 32, 812},
 };
 
-/* Bytes of an .eitm without its JSON and padding: matrices, fields, table, grid, golden frame. */
+/* What `model build` puts into the sections of the model errors, with its defaults. */
+enum { PLACES = 16, MOVES = 16, TERMS = EITS_MAX_MOVE_TERMS, RESTS = 16, ROW_ERRORS = 24 };
+
+/* Bytes of an .eitm without its JSON, section by section (docs/reference/eitm-format.md). */
 static size_t model_bytes(const size *s, size_t bytes_a_number)
 {
-    const size_t stride = EITS_STRIDE(s->rank);
-    const size_t matrices = 4 * stride * s->folded + bytes_a_number * stride * s->pixels;
-    const size_t fields = (size_t)2 * (2 * s->electrodes + 4) * s->pixels;
-    const size_t rest = 4u * s->rows + 12u * s->folded + 8u * s->pixels;
-    return matrices + fields + rest + 8u * s->rows + 4u * s->pixels;
+    const size_t rows = s->rows, folded = s->folded, rank = s->rank, pixels = s->pixels;
+    const size_t stride = EITS_STRIDE(rank), fields = EITS_STRIDE(2 * s->electrodes + 4);
+    const size_t sections[] = {
+        64 + 16 * 18,                                                 /* head and table */
+        64,                                                           /* DIMS */
+        64,                                                           /* DEFS */
+        4 * rows,                                                     /* PROT */
+        8 * folded,                                                   /* FOLD */
+        4 * folded,                                                   /* VREF */
+        4 * stride * folded,                                          /* REDU */
+        bytes_a_number * stride * pixels,                             /* SENS */
+        bytes_a_number < 4 ? 4 * pixels : 0,                          /* SCAL */
+        4 * pixels,                                                   /* COLW */
+        4 * pixels,                                                   /* GRID */
+        4 * (2 * rows + pixels),                                      /* GOLD */
+        36,                                                           /* SUMS */
+        16 + 16 * stride,                                             /* WHIT */
+        16 + 4 * rank * (rank + 1),                                   /* UNCE */
+        4 * PLACES * folded,                                          /* GEOM */
+        16 + 4 * (MOVES * (folded + 2 * TERMS) + RESTS * folded),     /* MOVE */
+        16 + 4 * (folded * (ROW_ERRORS + MOVES) + 4 * TERMS * MOVES), /* ROWE */
+        16 + 2 * fields * pixels,                                     /* FLDS */
+    };
+    size_t bytes = 0;
+    for (size_t k = 0; k < sizeof sections / sizeof *sections; ++k)
+        bytes += EITS_ALIGN16(sections[k]);
+    return bytes;
+}
+
+static size_t kb(size_t bytes)
+{
+    return (bytes + 500) / 1000;
 }
 
 int main(void)
@@ -37,8 +67,8 @@ int main(void)
         const size_t host =
             EITS_WORKSPACE_SIZE(s->rows, s->folded, s->rank, s->pixels, cells, s->electrodes, 1);
         printf("| %s | %u x %u | %zu | %zu | %zu | %zu |\n", s->name, (unsigned)s->rank,
-               (unsigned)s->pixels, ram / 1000, host / 1000, model_bytes(s, 4) / 1000,
-               model_bytes(s, 1) / 1000);
+               (unsigned)s->pixels, kb(ram), kb(host), kb(model_bytes(s, 4)),
+               kb(model_bytes(s, 1)));
     }
     return 0;
 }

@@ -3,6 +3,7 @@ and Zephyr. The toolchains of these are not here: their rules are read by stand-
 are compiled by the processor's own compiler."""
 
 import json
+import math
 import platform
 import re
 import subprocess
@@ -13,6 +14,7 @@ from build_tools import ROOT, run, tool
 
 from eitskin.model.options import default_options
 from eitskin.model.prebuilt import load_prebuilt
+from eitskin.solve.reconstructor import Reconstructor
 from eitskin_emulator.core_on_qemu import run_steps
 from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
 from frames_of_programs import assert_the_bits_of_the_host
@@ -40,24 +42,98 @@ def fused() -> list[str]:
     return ["-mfma"] if platform.machine() in ("x86_64", "AMD64") else []
 
 
-def amalgamated(compiler: str, flags: list[str], made: Path, folder: Path) -> Path:
-    one = made / "amalgamation"
-    include = [f"-I{one}", f"-I{ROOT / 'csrc' / 'include'}"]
+def with_frames(compiler: str, flags: list[str], core: Path, folder: Path) -> Path:
+    include = [f"-I{core.parent}", f"-I{ROOT / 'csrc' / 'include'}"]
     program = folder / "frames"
-    run(compiler, *flags, *include, one / "eitskin.c", PROGRAM, "-lm", "-o", program)
+    run(compiler, *flags, *include, core, PROGRAM, "-lm", "-o", program)
     return program
 
 
-def test_one_file_gives_the_bits_of_the_library(made, tmp_path):
+CONTRACTED = ["-O1", "-fexpensive-optimizations", "-std=gnu11", "-ffp-contract=fast", *fused()]
+
+
+@pytest.fixture(scope="module")
+def one_object(made) -> Path:
+    """The amalgamation, compiled by a compiler that is asked to contract."""
+    one = made / "amalgamation" / "eitskin.o"
+    run(tool("gcc", "cc"), *CONTRACTED, "-c", one.with_suffix(".c"), "-o", one)
+    return one
+
+
+def test_one_file_gives_the_bits_of_the_library(one_object, tmp_path):
     """Although the compiler is asked to contract."""
-    flags = ["-O1", "-fexpensive-optimizations", "-std=gnu11", "-ffp-contract=fast", *fused()]
-    program = amalgamated(tool("gcc", "cc"), flags, made, tmp_path)
+    program = with_frames(tool("gcc", "cc"), CONTRACTED, one_object, tmp_path)
     assert_the_bits_of_the_host(program, tmp_path, ["env"], most=4)
+
+
+def test_the_stream_of_a_firmware_follows_its_touches(one_object, tmp_path):
+    """From static memory: a touch is reported after a drive of the frame in which it landed, and
+    keeps its id and the golden frame's place."""
+    source, program = ROOT / "examples" / "c" / "stream.c", tmp_path / "stream"
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Werror", f"-I{one_object.parent}"]
+    run(tool("gcc", "cc"), *flags, source, one_object, "-lm", "-o", program)
+    untouched, *frames = re.split(r"^frame \d+: ", run(program), flags=re.MULTILINE)[1:]
+    assert re.search(r"^0 touches\nframe 1, drive \d+: a touch at ", untouched)
+    model, _ = load_prebuilt()
+    skin = Reconstructor(model)
+    skin.tare(model.golden.reference_v)
+    places = {(touch.x_mm, touch.y_mm) for touch in skin.reconstruct(model.golden.frame_v).touches}
+    seen = []
+    for text in frames:
+        found = re.findall(r"^touch (\d+): \((\S+), (\S+)\) mm", text, re.MULTILINE)
+        assert len(found) == len(places) == 2
+        seen.append({one: (float(x), float(y)) for one, x, y in found})
+        for place in seen[-1].values():
+            assert min(math.dist(place, other) for other in places) < 4
+    assert all(ids.keys() == seen[0].keys() for ids in seen) and len(seen) == 5
+
+
+def test_mistakes_get_the_answers_of_the_page(one_object, tmp_path):
+    """Those of "Calls that fail", in its order."""
+    source, program = Path(__file__).parent / "misuse.c", tmp_path / "misuse"
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{one_object.parent}"]
+    run(tool("gcc", "cc"), *flags, source, one_object, "-lm", "-o", program)
+    said = [line.rsplit(": ", 1) for line in run(program).splitlines()]
+    numbers = {what: int(number) for what, number in said if not what.startswith("touches")}
+    assert [number for what, number in said if what.startswith("touches")] == ["0"] * 4
+    assert numbers.pop("masked") == numbers.pop("diagnosed") == 1
+    types = (ROOT / "csrc" / "include" / "eitskin" / "types.h").read_text()
+    status = {name: int(n) for name, n in re.findall(r"(EITS_\w+) = (-?\d+)", types)}
+    page = (ROOT / "docs" / "reference" / "c-api.md").read_text(encoding="utf-8")
+    answered = {
+        name
+        for line in page.split("## Calls that fail")[1].split("## Memory")[0].splitlines()
+        if line.startswith("| ")
+        for name in re.findall(r"`(EITS_(?:OK|E_\w+))`", line)
+    }
+    assert {status[name] for name in answered} == set(numbers.values())
+    expected = {
+        "unaligned": "EITS_E_MODEL_ALIGNMENT",
+        "cut": "EITS_E_MODEL_TRUNCATED",
+        "changed": "EITS_E_MODEL_CRC",
+        "small workspace": "EITS_E_WORKSPACE",
+        "unaligned workspace": "EITS_E_WORKSPACE",
+        "begin with 3": "EITS_E_ARGUMENT",
+        "add without begin": "EITS_E_ARGUMENT",
+        "finish without begin": "EITS_E_REFERENCE_SHORT",
+        "finish too early": "EITS_E_REFERENCE_SHORT",
+        "no reference": "EITS_E_NO_REFERENCE",
+        "length": "EITS_E_FRAME_LENGTH",
+        "NaN in a row": "EITS_OK",
+        "NaN": "EITS_E_FRAME_ROWS",
+        "zeros": "EITS_E_FRAME_ZERO",
+        "mV": "EITS_OK",
+        "option": "EITS_E_ARGUMENT",
+        "row": "EITS_E_ARGUMENT",
+        "tracker without noise": "EITS_E_NO_REFERENCE",
+    }
+    assert numbers == {what: status[name] for what, name in expected.items()}
 
 
 @pytest.mark.long("the same by gcc")
 def test_one_file_gives_the_bits_by_clang(made, tmp_path):
-    program = amalgamated(tool("clang"), ["-O3", "-std=gnu11", *fused()], made, tmp_path)
+    core = made / "amalgamation" / "eitskin.c"
+    program = with_frames(tool("clang"), ["-O3", "-std=gnu11", *fused()], core, tmp_path)
     assert_the_bits_of_the_host(program, tmp_path, ["env"])
 
 
