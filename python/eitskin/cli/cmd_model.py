@@ -141,7 +141,7 @@ def run_build(options: argparse.Namespace) -> int:
         if protocol.hash != own.hash:
             raise UsageError(
                 "model build: an EIDORS model has its own Jacobian, for its own pattern; leave out"
-                " --drive and --measure"
+                " --drive, --measure and --rows-of"
             )
     refuse_unwritable(options.output)
     settings = BuildSettings(
@@ -184,6 +184,11 @@ def _is_eidors(options: argparse.Namespace) -> bool:
 def _skin_of(options: argparse.Namespace) -> tuple[Skin, Protocol]:
     if (options.skin is None) == (not options.paper):
         raise UsageError(f"model {options.action}: give either a SKIN.toml or --paper")
+    if options.skin is not None and options.skin.suffix.lower() == ".npz":
+        raise UsageError(
+            f"model {options.action}: {options.skin} has frames and no skin; name the skin,"
+            f" SKIN.toml or --paper, and add  --rows-of {options.skin}  to measure their rows"
+        )
     return skin_and_protocol(options, options.skin)
 
 

@@ -142,7 +142,7 @@ class Reconstructor:
                 f" {protocol.n_electrodes} electrodes, {protocol.n_rows} rows) do not match the"
                 f" model's {pattern_name(own)} ({own.hash:016x}, {own.n_electrodes} electrodes,"
                 f" {own.n_rows} rows); import the frames in the model's order, or build a model"
-                " with their protocol"
+                " of their rows:  eitskin model build SKIN.toml --rows-of FRAMES.npz -o MODEL.eitm"
             )
 
     def tare(self, untouched_v: npt.ArrayLike) -> LearnedReference:

@@ -1,5 +1,6 @@
 """``eitskin model``: from a description to a model, what is in it, and that it verifies."""
 
+import argparse
 import json
 import os
 import re
@@ -8,11 +9,16 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import eitskin
+from eitskin.cli import cmd_model
+from eitskin.errors import FileError, UsageError
+from eitskin.frames.frames import Frames, save_frames
 from eitskin.model.eitm import load_model
 from eitskin.model.model import Defaults
+from eitskin.skin.protocol import Protocol, adjacent, table
 from eitskin.skin.skin import load_skin
 from fresh_python import MAIN, run_command, run_python, without, words
 from small_models import prebuilt
@@ -178,3 +184,49 @@ def test_pixels_too_coarse_for_a_narrow_skin_are_told(ran, tmp_path):
     assert re.search(r"a pixel of [0-9.]+ mm is too coarse for a skin about 18\.5 mm wide", err)
     assert "build it with  --pixels N" in err
     assert "too coarse" not in ran(0, build)[1]
+
+
+def frames_of_some_rows(path: Path, count: int = 16) -> Protocol:
+    """Write frames of every row of adjacent but each third; return their protocol."""
+    rows = adjacent(count).drive_measure
+    protocol = table(count, rows[np.arange(len(rows)) % 3 != 2], 2e-3)
+    untouched_v = np.full((2, protocol.n_rows), -0.01)
+    save_frames(path, Frames(protocol, untouched_v, untouched_v, ("one", "two")))
+    return protocol
+
+
+def build(arguments: list[str]) -> None:
+    parser = argparse.ArgumentParser()
+    cmd_model.add_options(parser)
+    options = parser.parse_args(["build", *arguments])
+    options.run(options)
+
+
+def test_build_measures_the_rows_of_frames(tmp_path):
+    protocol = frames_of_some_rows(tmp_path / "frames.npz")
+    skin, model = write_skin(tmp_path), tmp_path / "own.eitm"
+    build([str(skin), "--rows-of", str(tmp_path / "frames.npz"), *QUICK, "-o", str(model)])
+    built, _ = load_model(model)
+    assert built.protocol.hash == protocol.hash
+    assert built.protocol.current_a == pytest.approx(2e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["{skin}", "--rows-of", "{frames}", "--drive", "adjacent"], "give one of them"),
+        (["{skin}", "--rows-of", "{other}"], "frames of 8 electrodes, but the skin has 16"),
+        (["{skin}", "--rows-of", "{nowhere}"], "no such frames file"),
+        (["{frames}"], "add  --rows-of {frames}"),
+    ],
+)
+def test_rows_that_cannot_be_measured_are_refused(arguments, said, tmp_path):
+    paths = {name: tmp_path / f"{name}.npz" for name in ("frames", "other", "nowhere")}
+    frames_of_some_rows(paths["frames"])
+    frames_of_some_rows(paths["other"], 8)
+    named = {"skin": write_skin(tmp_path)} | paths
+    filled = [text.format(**named) for text in arguments]
+    with pytest.raises(UsageError if "such" not in said else FileError) as caught:
+        build([*filled, "-o", str(tmp_path / "x.eitm")])
+    assert said.format(**named) in str(caught.value)
+    assert not (tmp_path / "x.eitm").exists()
