@@ -295,6 +295,21 @@ def test_the_package_gives_the_bits_and_costs(processor, made, tmp_path):
     assert totals[1] - totals[0] > 1_000_000
 
 
+@pytest.mark.parametrize(
+    "page", ["README.md", "docs/guide/embedding.md", "docs/reference/c-api.md"]
+)
+def test_a_page_has_the_flash_of_the_prebuilt_model(page):
+    """As stored, and with S as i8, which then has scales, too."""
+    blob = MODEL.read_bytes()
+    model, _ = load_prebuilt()
+    columns = model.stored.columns
+    assert columns.itemsize == 4
+    narrow = len(blob) - 3 * columns.size + 4 * len(columns)
+    text = (ROOT / page).read_text(encoding="utf-8")
+    full, small = round(len(blob), -3) // 1000, round(narrow, -3) // 1000
+    assert re.search(rf"\b{full}\b.*?\b{small}\b|\b{small}\b.*?\b{full}\b", text), (full, small)
+
+
 def test_it_writes_over_nothing(made):
     done = subprocess.run(
         [ROOT / "scripts" / "embed", made], capture_output=True, text=True, check=False
