@@ -120,3 +120,12 @@ def test_it_is_one_on_a_cortex_m4(tmp_path):
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
     check(tmp_path / "firmware" / "eitskin_example.elf", "mps2-an386")
+
+
+def test_the_porting_guide_counts_the_lines_of_its_files():
+    page = (ROOT / "docs" / "guide" / "your-board.md").read_text(encoding="utf-8")
+    folder = ROOT / "firmware" / "boards" / "example"
+    counts = re.findall(r"^\| `([\w./]+)` \| (\d+) \|", page, re.MULTILINE)
+    assert len(counts) == 10
+    for name, lines in counts:
+        assert len((folder / name).read_text(encoding="utf-8").splitlines()) == int(lines), name

@@ -115,3 +115,32 @@ def test_the_flash_map_is_the_linkers_and_the_stores():
     assert "ORIGIN = 0x08000000, LENGTH = 256K" in script and "| 0x08000000 | 256 KB" in PAGE
     assert re.search(r"#define BANKS_START +0x08040000u", store)
     assert "| 0x08040000 | 512 KB" in PAGE and "| 0x080C0000 | 512 KB" in PAGE
+    assert "0x08140000 (9) and 0x08180000 (10), 256 KB each" in store
+    assert "| 0x08140000 | 256 KB" in PAGE and "| 0x08180000 | 256 KB" in PAGE
+
+
+def test_the_map_of_the_ram_is_the_linkers():
+    script = (BOARD / "nucleo_f767zi.ld").read_text(encoding="utf-8")
+    regions = re.findall(r"^    (ITCM|DTCM|SRAM) .*ORIGIN = (\w+), LENGTH = (\d+)K", script, re.M)
+    assert len(regions) == 3 and "stack_bytes = 24K" in script and "stack (24 KB)" in PAGE
+    for _, origin, length in regions:
+        assert f"| {origin} | {length} KB" in PAGE
+
+
+def test_the_timing_of_a_scan_is_that_of_the_settings():
+    """The page's slot, of the settings after a start."""
+    app = ROOT / "firmware" / "app" / "acquire"
+    scan = (app / "scan.h").read_text(encoding="utf-8")
+    default = (app / "frame.h").read_text(encoding="utf-8")
+    number = {
+        name: int(re.search(rf"\.{name} = (\d+)", default)[1])
+        for name in ("sample_rate_hz", "samples", "settle_us")
+    }
+    switch_us = int(re.search(r"FW_SWITCH_US +(\d+)u", scan)[1])
+    assert re.search(r"FW_MAX_TRIES +8u", scan) and "up to eight times" in PAGE
+    burst_us = number["samples"] * 1_000_000 // number["sample_rate_hz"]
+    least = burst_us + switch_us + number["settle_us"]
+    slot_us = -(-least // 20) * 20  # whole periods of 50 kHz
+    assert f"{burst_us} + {switch_us} + {number['settle_us']} = {least} µs" in PAGE
+    assert f"slot of a row, {slot_us} µs" in PAGE
+    assert f"208 rows take {208 * slot_us / 1000} ms, {1e6 / 208 / slot_us:.1f} frames" in PAGE
