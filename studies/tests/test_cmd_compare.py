@@ -50,6 +50,8 @@ def test_json_has_every_method_and_only_json(capsys):
         (["--seed", "-1"], UsageError, "--seed"),
         (["--csv", "/nowhere/at/all.csv"], FileError, "make it first"),
         (["--skin", "nowhere.toml"], FileError, "nowhere.toml"),
+        (["--give", "frames.csv"], UsageError, "ends with"),
+        (["--give", "frames.mat", "--images", "mine.mat"], UsageError, "a later run"),
     ],
 )
 def test_bad_arguments_are_refused_before_the_work(arguments, error, text, capsys):

@@ -4,11 +4,16 @@ import argparse
 import json
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from eitskin.cli.arguments import Output, option
 from eitskin.cli.progress import named_bar
 from eitskin.errors import FileError, UsageError
+
+if TYPE_CHECKING:
+    from eitskin.skin.protocol import Protocol
+    from eitskin.skin.skin import Skin
+    from eitskin_studies.compare.run import CompareSettings
 
 
 def add_parser(subparsers: Any) -> None:
@@ -53,6 +58,17 @@ def add_parser(subparsers: Any) -> None:
         " scikit-learn)",
         Path,
     )
+    option(
+        parser,
+        "--give FRAMES.mat",
+        "write the frames for a program of your own (.mat or .npz), and end",
+        Output,
+    )
+    option(
+        parser,
+        "--images FILES",
+        "also the images that your programs made of these frames, such as mine.mat,other.npz",
+    )
     option(parser, "--threads N", "threads for the C core's frames", default=1)
     option(parser, "--json", "print JSON, with the curves over the threshold")
     option(parser, "--csv FILE", "write the numbers of every scene", Output)
@@ -74,6 +90,7 @@ def run(options: argparse.Namespace) -> int:
     from eitskin_studies.compare.table import to_csv, to_json, to_text
 
     _check(options)
+    images = [Path(name.strip()) for name in (options.images or "").split(",") if name.strip()]
     skin, protocol = (
         (paper_skin(), adjacent(16)) if options.skin is None else load_skin(options.skin)
     )
@@ -88,11 +105,13 @@ def run(options: argparse.Namespace) -> int:
         ),
         lookup=options.lookup or metrics.LOOKUP,
     )
+    if options.give is not None:
+        return _give(options.give, skin, protocol, settings)
     comparison = compare(
         skin,
         protocol,
         settings,
-        families=partial(methods, threads=options.threads, dataset=options.learned),
+        families=partial(methods, threads=options.threads, dataset=options.learned, images=images),
         only=[word.strip() for word in (options.methods or "").split(",") if word.strip()],
         progress=named_bar,
     )
@@ -109,18 +128,40 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
+def _give(path: Path, skin: "Skin", protocol: "Protocol", settings: "CompareSettings") -> int:
+    """Simulate, and write the frames."""
+    from eitskin_studies.compare.families import setup_for
+    from eitskin_studies.compare.run import simulated_scenes
+    from eitskin_studies.datasets.exchange import give_frames
+
+    setup = setup_for(skin, protocol, elements=settings.elements)
+    scenes = simulated_scenes(skin, protocol, settings, named_bar)
+    count = give_frames(path, setup, scenes.train, scenes.test, scenes.targets)
+    print(
+        f"{path}: dv of {count} frames of {protocol.n_rows} rows, J of {setup.grid.n_pixels}"
+        f" pixels; save dv with images ({count}, {setup.grid.n_pixels}) in a file, and give it to "
+        " eitskin compare --images FILE  with the same options"
+    )
+    return 0
+
+
 def _check(options: argparse.Namespace) -> None:
     """Reject before the work what would fail after it."""
     from eitskin.solve.batch import check_threads
+    from eitskin_studies.datasets.exchange import check_suffix
 
     if not -20 <= options.snr_db <= 200:
         raise UsageError(f"--snr-db {options.snr_db:g} is out of range; use -20 to 200")
     check_threads(options.threads)
+    if options.give is not None:
+        check_suffix(options.give)
+        if options.images is not None:
+            raise UsageError("--give writes frames and ends; give --images to a later run")
     if options.learned is not None and not options.learned.is_dir():
         raise FileError(f"--learned {options.learned}: no such folder; run  eitskin dataset")
     if options.seed < 0:
         raise UsageError(f"--seed {options.seed} must be 0 or above")
-    for path in (options.csv, options.picture, options.curves):
+    for path in (options.csv, options.picture, options.curves, options.give):
         if path is not None and not path.parent.is_dir():
             raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
     if options.picture is not None or options.curves is not None:

@@ -1,5 +1,6 @@
 """The compared methods: baselines, the C core, and methods of other packages."""
 
+from collections.abc import Sequence
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,6 +14,7 @@ from eitskin_studies.compare.families import Family, Setup
 from eitskin_studies.compare.greit import train_greit
 from eitskin_studies.compare.learned import learned_family
 from eitskin_studies.compare.pyeit_method import pyeit_methods
+from eitskin_studies.datasets.exchange import returned_family
 
 ENTRY_POINT_GROUP = "eitskin.methods"
 STRENGTHS = (1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 1e-3, 1e-2)
@@ -22,19 +24,23 @@ RATIOS = (1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 CONVERGED_RATIOS = (1e-5, 1e-4, 1e-3, 3e-3)
 
 
-def methods(setup: Setup, threads: int = 1, dataset: Path | None = None) -> tuple[Family, ...]:
+def methods(
+    setup: Setup, threads: int = 1, dataset: Path | None = None, images: Sequence[Path] = ()
+) -> tuple[Family, ...]:
     """All that ``eitskin compare`` compares, in the order of its table; the C core's frames over
     ``threads``. pyEIT is among them where it is installed, a learned method where there is a
-    ``dataset`` to train it on.
+    ``dataset`` to train it on, and a method for each file of ``images`` that another program made.
 
     Raises:
         UsageError: the C core is not built, or a method of another package cannot be made.
+        FileError, FrameError: a file of ``images`` cannot be read or does not fit.
     """
+    returned = tuple(returned_family(setup, path) for path in images)
     classic = baseline_methods(setup.jacobian, setup.grid)
     converged = plain_fista(setup.jacobian, 3000, signed=False, ratios=CONVERGED_RATIOS)
     theirs = pyeit_methods(setup) if find_spec("pyeit") else ()
     learned = () if dataset is None else (learned_family(setup, dataset),)
-    others = (*classic, converged, *theirs, *learned, *own_methods(setup))
+    others = (*classic, converged, *theirs, *learned, *returned, *own_methods(setup))
     return (*others, *core_methods(setup, threads))
 
 

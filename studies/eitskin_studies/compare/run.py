@@ -160,6 +160,16 @@ class Comparison:
 
 
 @dataclass(frozen=True, eq=False)
+class Scenes:
+    """The simulated sessions of a comparison: to train on, to test on, and the small targets of
+    GREIT's figures."""
+
+    train: Simulated
+    test: Simulated
+    targets: Simulated
+
+
+@dataclass(frozen=True, eq=False)
 class _Session:
     """Scenes with what judging needs of them."""
 
@@ -195,27 +205,19 @@ def compare(
     setup = setup_for(skin, protocol, elements=how.elements)
     chosen = named(families(setup), only)
     image_scorer = metrics.judge_for(skin.outline, setup.grid, how.raster_mm, how.lookup)
-    mesh = mesh_for_elements(skin, how.simulated_elements)
+    scenes = simulated_scenes(skin, protocol, how, progress)
 
-    def session(role: str, count: int) -> _Session:
-        def watched(scenes: Sequence[Any]) -> Iterable[Any]:
-            return progress(scenes, f"simulating ({role})")
-
-        drawn = random_touches(skin.outline, how.seed, count, role, how.rules)
-        simulated = simulate(
-            skin, protocol, drawn, measurement=how.measurement, mesh=mesh, progress=watched
-        )
+    def session(simulated: Simulated) -> _Session:
         return _Session(
             simulated,
             simulated.differences_v(),
-            truth_masks(drawn, image_scorer.raster.points_mm),
-            tuple(scene.centres_mm() for scene in drawn.scenes),
+            truth_masks(simulated.touches, image_scorer.raster.points_mm),
+            tuple(scene.centres_mm() for scene in simulated.touches.scenes),
         )
 
-    train, test = session("train", how.train_scenes), session("test", how.scenes)
-    targets = small_targets(skin, protocol, mesh)
+    train, test = session(scenes.train), session(scenes.test)
     results = tuple(
-        _run(family, setup, image_scorer, train, test, targets, how.gate_mm)
+        _run(family, setup, image_scorer, train, test, scenes.targets, how.gate_mm)
         for family in progress(chosen, "reconstructing")
     )
     perfect = np.array(
@@ -234,6 +236,32 @@ def compare(
         results,
         float(ceiling[best]),
         THRESHOLDS[best],
+    )
+
+
+def simulated_scenes(
+    skin: Skin, protocol: Protocol, how: CompareSettings, progress: Progress = silent
+) -> Scenes:
+    """Simulate the scenes of a comparison; the same arguments give the same frames.
+
+    Raises:
+        UsageError, GeometryError, MissingExtraError: from drawing, meshing and simulating.
+    """
+    mesh = mesh_for_elements(skin, how.simulated_elements)
+
+    def session(role: str, count: int) -> Simulated:
+        def watched(scenes: Sequence[Any]) -> Iterable[Any]:
+            return progress(scenes, f"simulating ({role})")
+
+        drawn = random_touches(skin.outline, how.seed, count, role, how.rules)
+        return simulate(
+            skin, protocol, drawn, measurement=how.measurement, mesh=mesh, progress=watched
+        )
+
+    return Scenes(
+        session("train", how.train_scenes),
+        session("test", how.scenes),
+        small_targets(skin, protocol, mesh),
     )
 
 

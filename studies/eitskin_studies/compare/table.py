@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from eitskin_studies.compare.cost import Cost
 from eitskin_studies.compare.figures import Figures
 from eitskin_studies.compare.run import CompareResult, Comparison
 from eitskin_studies.harness.summary import Summary
@@ -179,8 +180,8 @@ def _cells(result: CompareResult) -> tuple[str, ...]:
         f"{miou.worst_tenth:.3f}",
         f"{position.median:.1f} mm" if position.count else "no hits",
         f"{100 * result.exact_count:.0f} %",
-        f"{result.cost.frame_ms:.2f}",
-        f"{result.cost.kept_kb:.0f}",
+        "-" if math.isnan(result.cost.frame_ms) else f"{result.cost.frame_ms:.2f}",
+        "-" if math.isnan(result.cost.kept_kb) else f"{result.cost.kept_kb:.0f}",
         f"{result.threshold:.2f}",
         f"{result.parameter} = {result.value:g}" if result.parameter else "",
     )
@@ -224,13 +225,12 @@ def _result_json(result: CompareResult) -> dict[str, Any]:
         "hit_share": result.hit_share,
         "false_per_scene": result.false_per_scene,
         "greit_figures": _numbers(result.figures),
-        "frame_ms": result.cost.frame_ms,
-        "kept_kb": result.cost.kept_kb,
+        **_numbers(result.cost),
         "miou_over_threshold": [float(value) for value in result.curve],
     }
 
 
-def _numbers(of: Summary | Figures) -> dict[str, float | int | None]:
+def _numbers(of: Summary | Figures | Cost) -> dict[str, float | int | None]:
     return {key: None if math.isnan(value) else value for key, value in asdict(of).items()}
 
 
