@@ -86,6 +86,32 @@ def test_as_a_subproject_it_brings_neither_tests_nor_werror(tmp_path):
     assert "firmware" not in rules
 
 
+BARE_METAL = """
+set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR arm)
+set(CMAKE_C_COMPILER arm-none-eabi-gcc)
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+set(CMAKE_C_FLAGS_INIT "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mfloat-abi=hard -mthumb")
+"""
+
+
+def test_a_project_for_a_microcontroller_gets_the_core_and_its_kernels(tmp_path):
+    """By its own toolchain file; no program of eitskin is built beside it, with another board's
+    memory map."""
+    (tmp_path / "board.cmake").write_text(BARE_METAL)
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\nproject(user LANGUAGES C)\nset(EITSKIN_M7 ON)\n"
+        f'add_subdirectory("{ROOT}" eitskin EXCLUDE_FROM_ALL)\n'
+        f'add_library(user STATIC "{EXAMPLES}/minimal.c")\n'
+        "target_link_libraries(user PRIVATE eitskin::core)\n"
+    )
+    toolchain = f"-DCMAKE_TOOLCHAIN_FILE={tmp_path / 'board.cmake'}"
+    run("cmake", "-S", tmp_path, "-B", tmp_path / "build", "-G", "Ninja", toolchain)
+    built = run("cmake", "--build", tmp_path / "build", "--", "-n", "-v")
+    assert "csrc/src/solve/fista.c" in built and "csrc/src/kernels/m7.c" in built
+    assert ".elf" not in built and "mps2" not in built and "fw_app" not in built
+
+
 def test_fetched_content_is_the_core_alone(tmp_path):
     """From an archive, as from a repository."""
     archive = tmp_path / "eitskin.tar.gz"
