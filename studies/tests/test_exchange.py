@@ -1,5 +1,7 @@
 """Frames of a comparison for another program, and its images back: scored as if it were ours."""
 
+import shutil
+import subprocess
 from functools import partial
 from pathlib import Path
 
@@ -81,6 +83,22 @@ def test_the_file_has_the_touches_of_training_scenes_alone(tmp_path, setup, scen
     )
     lengths = {len(value) for name, value in arrays.items() if "touch" in name and "un" not in name}
     assert lengths == {len(frames)}
+
+
+@pytest.mark.long("the other tests of the file, by numpy; Octave takes a minute to install")
+def test_the_script_of_the_page_runs_in_octave(tmp_path, setup, scenes):
+    octave = shutil.which("octave-cli")
+    assert octave, "octave-cli is not installed: apt-get install octave"
+    arrays = given(tmp_path / "frames.mat", setup, scenes)
+    page = Path(__file__).parents[2] / "docs" / "guide" / "own-method.md"
+    script = page.read_text(encoding="utf-8").split("```matlab\n")[1].split("```")[0]
+    (tmp_path / "script.m").write_text(script)
+    words = [octave, "--norc", "script.m"]
+    subprocess.run(words, cwd=tmp_path, check=True, timeout=120, capture_output=True)
+    theirs = returned_family(setup, tmp_path / "mine.mat")
+    assert theirs.values == (0.0, 1.0, 2.0, 3.0)
+    ours = baselines.gauss_newton(setup.jacobian, 1e-3).reconstruct(arrays["dv"])
+    assert np.allclose(theirs.make(3.0).reconstruct(arrays["dv"]), ours, atol=1e-6 * ours.max())
 
 
 def test_other_scenes_and_wrong_shapes_are_refused(tmp_path, setup, scenes):
