@@ -46,6 +46,14 @@ static eits_status take_reference(eits_context *skin)
     return status == EITS_OK ? eits_reference_finish(skin) : status;
 }
 
+/* Options for touches that are followed: fainter ones are found, too. */
+static eits_status follow_touches(eits_context *skin)
+{
+    eits_options options = *eits_get_options(skin);
+    const eits_status status = eits_options_track(&options);
+    return status == EITS_OK ? eits_set_options(skin, &options) : status;
+}
+
 /* One scan: each drive goes to the tracker at once, so that a touch is known some milliseconds
  * after contact. Prints the first drive of the frame that has a touch which no frame has shown yet.
  */
@@ -102,6 +110,8 @@ int main(void)
     eits_status status = eits_model_open(&model, eitskin_model, sizeof eitskin_model);
     if (status == EITS_OK)
         status = eits_init(workspace, sizeof workspace, &model, &skin);
+    if (status == EITS_OK)
+        status = follow_touches(skin);
     if (status == EITS_OK)
         status = take_reference(skin);
     if (status == EITS_OK)
