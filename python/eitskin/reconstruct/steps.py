@@ -74,6 +74,7 @@ def is_stream(frames: Frames) -> bool:
     return times is not None and len(times) > 1 and bool(np.all(np.diff(times) > 0))
 
 
+NOISE_FRAMES = 4  # untouched frames from which the core learns the noise
 IDS_OF_FRAMES = (
     "the frames have no ascending times, so ids number the touches of each frame alone; if the"
     " frames are a stream, import them with --time"
@@ -241,6 +242,12 @@ def take_reference(
         notes.append(
             f"warning: the reference correlates with the model only by {reference.correlation:.3f};"
             f" run  eitskin doctor {path}"
+        )
+    untouched = len(np.atleast_2d(frames.reference_voltage_v))
+    if untouched < NOISE_FRAMES:
+        notes.append(
+            f"{plural(untouched, 'untouched frame')}: the noise is unknown, so that noise may be"
+            f" reported as a touch or as crowded; {NOISE_FRAMES} or more show it"
         )
     if reference.outliers:
         notes.append(

@@ -298,3 +298,14 @@ def test_frames_with_times_are_a_stream(json_of, tmp_path):
         return [frame["touches"] for frame in facts["frames"]]
 
     assert touches(timed) != touches(alone) == touches(timed, "--threads", "2")
+
+
+@pytest.mark.parametrize(("untouched", "said"), [(1, "1 untouched frame: "), (4, None)])
+def test_few_untouched_frames_do_not_show_the_noise(untouched, said, frames_file, tmp_path, capsys):
+    frames = load_frames(frames_file)
+    few = replace(frames, reference_voltage_v=frames.reference_voltage_v[:untouched])
+    save_frames(tmp_path / "few.npz", few)
+    assert main(["reconstruct", str(tmp_path / "few.npz"), "--only", "test-s3-0"]) == 0
+    shown = capsys.readouterr().err
+    assert ("the noise is unknown" in shown) == (said is not None)
+    assert said is None or said in shown
