@@ -18,7 +18,7 @@ from eitskin.solve.reconstructor import Reconstructor
 from eitskin_emulator.core_on_qemu import run_steps
 from eitskin_emulator.core_steps import Choose, Load, Play, TareStep
 from frames_of_programs import assert_the_bits_of_the_host
-from small_models import session
+from small_models import session, small_blob
 
 PROGRAM = ROOT / "tests" / "emulated" / "frames_m7.c"
 MODEL = ROOT / "python" / "eitskin" / "model" / "paper.eitm"
@@ -293,6 +293,30 @@ def test_the_package_gives_the_bits_and_costs(processor, made, tmp_path):
         totals.append(int((tmp_path / "count.txt").read_text()))
     print(f"{processor}: {(totals[1] - totals[0]) / 10:.0f} instructions per frame")
     assert totals[1] - totals[0] > 1_000_000
+
+
+SIZES = """
+#include "eitskin_model.h"
+#include <stdio.h>
+int main(void)
+{
+    static eits_model m;
+    return eits_model_open(&m, eitskin_model, sizeof eitskin_model) != EITS_OK ||
+           EITSKIN_MODEL_ROWS != m.n_rows || EITSKIN_MODEL_TRACKER != eits_fast_size(&m) ||
+           EITSKIN_MODEL_WORKSPACE != eits_workspace_size(&m, 0);
+}
+"""
+
+
+@pytest.mark.parametrize("data", ["difference", "normalised"])
+def test_the_sizes_of_a_model_are_those_that_the_core_counts(data, one_object, tmp_path):
+    """Also without fields, where the tracker has no drives."""
+    (tmp_path / "m.eitm").write_bytes(small_blob("i8", data))
+    (tmp_path / "sizes.c").write_text(SIZES)
+    run(ROOT / "scripts" / "embed", tmp_path / "out", "--model", tmp_path / "m.eitm")
+    include = f"-I{tmp_path / 'out' / 'amalgamation'}"
+    run(tool("gcc", "cc"), include, tmp_path / "sizes.c", one_object, "-lm", "-o", tmp_path / "s")
+    run(tmp_path / "s")
 
 
 @pytest.mark.parametrize(
