@@ -43,7 +43,7 @@ OTHERS = {
     "limit": "bench limit --scenes 60 --seed 1 --page {page}",
     "diagnostics": "bench diagnostics --scenes 320 --crowds 24 --imperfect 40 --seed 4001"
     " --page {page}",
-    "gestures": "bench gestures --sessions 60 --seed 7001 --role judging --snr-db 60 40"
+    "gestures": "bench gestures --sessions 20 --seed 7001 --role judging --snr-db 60 40"
     " --page {page}",
     "peers": "bench peers --scenes 20 --seed 1 --page {page}",
     "scene-cost": "bench effects --frames 40 --page {page}",
