@@ -89,8 +89,10 @@ def test_reconstruct_with_a_preset(json_of, frames_file, ran):
     for info in (frame["info"] for frame in fine["frames"] + usual["frames"]):
         assert info["solve_us"] > 0 and info["touch_us"] >= 0
     quick = json.loads(ran(0, f"reconstruct {frames_file} --preset fast --json")[0])
-    macs = [sum(frame["info"]["macs"] for frame in one["frames"]) for one in (quick, usual)]
-    assert macs[0] <= macs[1]
+    names = quick["settings"]["name"], "standard"  # which has the default settings
+    fast, default = (next(one for one in load_front().points if one.name == n) for n in names)
+    costs_us = [one.cost("us", "host", Conditions(), worst=False) for one in (fast, default)]
+    assert (costs_us[0] or 0) <= (costs_us[1] or 0)  # as they were measured
 
 
 @pytest.mark.parametrize(
