@@ -112,8 +112,9 @@ def check_reference_frames(frames: FloatArray, masked: BoolArray, saturation_v: 
 @dataclass(frozen=True)
 class LearnedReference:
     """The reference as learned. ``correlation`` is with the model's own reference, ``gain`` is in
-    model volts per measured volt, ``noise_v`` (rms over rows) and ``lambda_noise`` are 0 if only
-    one frame was given, and ``outliers`` is the number of readings that were left out."""
+    model volts per measured volt, ``noise_v`` (rms over rows) and ``lambda_noise`` are 0 if fewer
+    than ``MIN_REFERENCE_FRAMES`` (4) frames were given, and ``outliers`` is the number of readings
+    that were left out."""
 
     frames: int
     correlation: float

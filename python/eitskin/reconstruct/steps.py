@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from eitskin.config import nearest
+from eitskin.core.constants_table import MIN_REFERENCE_FRAMES
 from eitskin.core.diagnostics import plural
 from eitskin.core.results import LearnedReference, Reconstruction
 from eitskin.errors import ConfigError, EitskinError, FrameError, UsageError
@@ -74,7 +75,6 @@ def is_stream(frames: Frames) -> bool:
     return times is not None and len(times) > 1 and bool(np.all(np.diff(times) > 0))
 
 
-NOISE_FRAMES = 4  # untouched frames from which the core learns the noise
 IDS_OF_FRAMES = (
     "the frames have no ascending times, so ids number the touches of each frame alone; if the"
     " frames are a stream, import them with --time"
@@ -243,11 +243,10 @@ def take_reference(
             f"warning: the reference correlates with the model only by {reference.correlation:.3f};"
             f" run  eitskin doctor {path}"
         )
-    untouched = len(np.atleast_2d(frames.reference_voltage_v))
-    if untouched < NOISE_FRAMES:
+    if reference.frames < MIN_REFERENCE_FRAMES:
         notes.append(
-            f"{plural(untouched, 'untouched frame')}: the noise is unknown, so that noise may be"
-            f" reported as a touch or as crowded; {NOISE_FRAMES} or more show it"
+            f"{plural(reference.frames, 'untouched frame')}: the noise is unknown, so that noise"
+            f" may be reported as a touch or as crowded; {MIN_REFERENCE_FRAMES} or more show it"
         )
     if reference.outliers:
         notes.append(

@@ -18,7 +18,9 @@ class Replay:
     def __init__(self, every: int = 1, offset_us: int = 0) -> None:
         self._every, self._offset_us = every, offset_us
         self._start_us: int | None = None
-        self._count = self._step_us = 0
+        self._step_us = 0
+        self.frames = 0
+        """The number of frames since its beginning, with those between the shown ones."""
         self.last_us = offset_us
         """The time of the last frame that was shown."""
 
@@ -31,8 +33,8 @@ class Replay:
         if message.untouched:
             return None
         time_us = self._shown_us(message.time_us)
-        self._count += 1
-        if (self._count - 1) % self._every:
+        self.frames += 1
+        if (self.frames - 1) % self._every:
             return None
         self._step_us, self.last_us = time_us - self.last_us, time_us
         return replace(message, time_us=time_us)

@@ -120,7 +120,6 @@ class Session:
         self._last_s: float | None = None  # of the last frame
         self._replay: Replay | None = None
         self._skip_us: int | None = None  # messages before it are not shown
-        self._first = True  # no frame of the recording was read since its beginning
         self._requests = Requests()
         self._stopping, self._started, self._every = threading.Event(), False, 1
         self._starting = threading.RLock()
@@ -350,7 +349,6 @@ class Session:
         if self.replays:
             if what & Stream.EVENTS:
                 what |= Stream.TOUCHES  # gestures are made from these touches if none were recorded
-            self._first = True
             self._packets = packet_stream(self.device, what, 1, 0)
         else:
             limited = how.frames and how.report == "frame"
@@ -382,11 +380,10 @@ class Session:
     def _replayed(self, replay: Replay, message: Message) -> Message | None:
         """Return a recording's ``message`` as it is shown, None if it is not. The first frame tells
         the observer when the scene began, even if what is shown begins later."""
+        begins = not replay.frames
         shown = replay.take(message)
-        if self._first and isinstance(shown, Frame):
-            self._first = False
-            if self.observer is not None:
-                self.observer.began(shown.board_us)
+        if begins and isinstance(shown, Frame) and self.observer is not None:
+            self.observer.began(shown.board_us)
         return shown
 
     def _skipped(self, message: Message) -> bool:

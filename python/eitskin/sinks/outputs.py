@@ -158,7 +158,7 @@ class Outputs:
     def lines(self) -> list[str]:
         """The counts as lines of text."""
         return [
-            f"to {one['url'].removesuffix(':')}: {one['sent']} sent"
+            f"{_to(one['url'])} {one['sent']} sent"
             + (f", {one['dropped']} dropped" if one["dropped"] else "")
             + (f", {one['failed']} failed ({one['error']})" if one["failed"] else "")
             for one in self.counts
@@ -196,6 +196,11 @@ def _touch_source(session: AnySession, part: str, overwrite: bool) -> TouchSourc
         tare=lambda: session.parts[part].tare(),  # of the session under way then
         link=None if one.placement is None else one.placement.link,
     )
+
+
+def _to(url: str) -> str:
+    """How a line about a sink begins; the address of some, such as "ros2:", ends with a colon."""
+    return f"to {url.removesuffix(':')}:"
 
 
 class Queue:
@@ -285,4 +290,4 @@ class Queue:
         text = " ".join(str(error).split()) or type(error).__name__
         if text != self._error:
             self._error = text
-            self._say(f"to {self._url.removesuffix(':')}: {text}")
+            self._say(f"{_to(self._url)} {text}")

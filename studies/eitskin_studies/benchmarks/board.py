@@ -41,6 +41,7 @@ IMAGE = "eitskin_nucleo_f767zi"
 TARGETS = ("frames_m7", IMAGE, "eitskin_mps2_an500")
 SCENE = "emu:two_touch"
 TARE_FRAMES = 8
+SOLVED_SHARE = 0.98  # of the scans; if fewer are solved, the solves bound the rate
 CODE, STATICS, STACK = (
     (".vectors", ".text", ".ARM.exidx"),
     (".data", ".bss", ".dtcm", ".noinit"),
@@ -87,9 +88,6 @@ class ImageSize:
     stack_bytes: int
 
 
-SCANS_LOST = 0.98  # of the scans are solved, or less: solves bound the rate
-
-
 @dataclass(frozen=True)
 class BoardRate:
     """The emulated NUCLEO-F767ZI on a scene of two touches: rows and samples measured a frame, the
@@ -109,7 +107,7 @@ class BoardRate:
     def bound(self) -> str:
         """The stage that bounds the frame rate. Single frames whose solve takes longer than a scan
         lower the rate, too, even if the median solve is shorter."""
-        return "solve" if self.rate_hz * self.acquire_us < SCANS_LOST * 1e6 else "acquisition"
+        return "solve" if self.rate_hz * self.acquire_us < SOLVED_SHARE * 1e6 else "acquisition"
 
 
 @dataclass(frozen=True)
