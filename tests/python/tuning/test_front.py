@@ -12,6 +12,7 @@ from eitskin.model.options import default_options
 from eitskin.tuning.for_model import operating_point_for
 from eitskin.tuning.front import (
     MEASURED_DB,
+    PRESETS,
     Conditions,
     Limit,
     OperatingPoint,
@@ -72,6 +73,24 @@ def test_what_cannot_be_is_refused_with_how_near_one_comes(asked, said):
     with pytest.raises(UsageError, match=said) as caught:
         choose(COLD, target(**asked))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("noise", [(1.0, 1.04), (1.04, 1.0)])
+def test_host_times_within_their_noise_do_not_choose_but_macs_do(noise):
+    """Two runs that time the same points a little differently make the same presets."""
+    made = point("more sweeps", 0.85, 2.2e6, touch_sweeps=12), point("few", 0.85, 2.1e6)
+    points = [
+        replace(one, host_us={"p50": 200.0 * part, "most": 900.0 * part})
+        for one, part in zip(made, noise, strict=True)
+    ]
+    for asked in (
+        *(named_preset(name, "host") for name in PRESETS),
+        target(accuracy=0.84, board="host"),
+        target("1ms", board="host"),
+    ):
+        assert choose(points, asked).name == "few"
+    faster = replace(made[0], host_us={"p50": 180.0, "most": 800.0})
+    assert choose([faster, points[1]], target(accuracy=0.84, board="host")).name == "more sweeps"
 
 
 def test_a_longer_scan_is_chosen_only_where_there_is_time():
