@@ -76,7 +76,7 @@ def header(comparison: Comparison) -> list[tuple[str, str]]:
             "skin",
             (
                 f"{setup.skin.name}, {setup.skin.electrodes.count} electrodes,"
-                f" {setup.protocol.n_rows} voltages a frame; image of {grid.n_pixels} pixels of"
+                f" {setup.protocol.n_rows} voltages per frame; image of {grid.n_pixels} pixels of"
                 f" {grid.pixel_mm:.2f} mm"
             ),
         ),

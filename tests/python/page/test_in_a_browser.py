@@ -375,6 +375,15 @@ def test_a_phone_shows_the_skin_below_its_toolbar(live):
     assert box["height"] >= 0.9 * box["width"]
 
 
+def test_a_phone_on_its_side_shows_the_whole_skin(live):
+    live.size(844, 390)
+    until(lambda: live.run("return innerWidth") == 844)
+    box = live.box("skin")
+    assert box["bottom"] <= 390 and box["height"] >= 0.5 * 390
+    assert live.box("tare")["top"] == live.box("record")["top"] and live.box("expert")["top"] < 80
+    assert box["right"] < 0.7 * 844  # beside it the page can be scrolled with a finger
+
+
 def place_on_screen(page: Page, x_mm: float, y_mm: float) -> tuple[float, float]:
     """Return where the skin's canvas shows a place, in CSS pixels from the window's corner."""
     box = page.box("skin")

@@ -35,9 +35,9 @@ export class PlotsDrawing {
     const most = Math.max(...[...this.lines.values()].flat().map((at) => at[last] || 0), 1e-9);
     const [x0, y0, x1, y1] = box || [0, 0, 1, 1];
     const strips = [
-      { name: "x", title: "x, mm", low: Math.floor(x0), high: Math.ceil(x1) },
-      { name: "y", title: "y, mm", low: Math.floor(y0), high: Math.ceil(y1) },
-      { name: last, title: forces ? "force, N" : "S mm²/m", low: 0, high: round(most) },
+      { name: "x", title: ["x, mm"], low: Math.floor(x0), high: Math.ceil(x1) },
+      { name: "y", title: ["y, mm"], low: Math.floor(y0), high: Math.ceil(y1) },
+      { name: last, title: forces ? ["force, N"] : ["strength,", "S mm²/m"], low: 0, high: round(most) },
     ];
     const left = 56, end = this.times.length ? this.times[this.times.length - 1] : 0;
     const t = (time) => width - 4 - ((end - time) / SHOWN_S) * (width - left - 4);
@@ -58,7 +58,7 @@ export class PlotsDrawing {
         context.lineTo(width, at);
         context.stroke();
       }
-      context.fillText(strip.title, left - 6, (top + bottom) / 2);
+      strip.title.forEach((line, n) => context.fillText(line, left - 6, (top + bottom) / 2 + 12 * (n - (strip.title.length - 1) / 2)));
       context.fillText(shown(strip.high), left - 6, top + 4);
       context.fillText(shown(strip.low), left - 6, bottom - 4);
       for (const [id, line] of this.lines) {
