@@ -41,9 +41,9 @@ BOARD_LABELS = (
     "to the slowest frame by the pessimistic bound",
 )
 TICKS_MS = (15, 20, 30, 50, 100, 200, 400)
-# Cycles per instruction of solve and touches: emu:two_touch takes 14.8 to 34.1 ms by the two bounds
-# of board-cost.md, and 11.6 ms at an instruction per cycle.
-BOARD_BOUNDS = (14.8 / 11.6, 34.1 / 11.6)
+# Cycles per instruction of solve and touches: half scans of emu:two_touch take 11.94 to 27.12 ms by
+# the two bounds of board-cost.md, and 10.49 ms at an instruction per cycle.
+BOARD_BOUNDS = (11.94 / 10.49, 27.12 / 10.49)
 
 
 def draw_equal(path: Path, front: Front) -> None:
@@ -153,11 +153,15 @@ def draw_board(path: Path, front: Front) -> None:
             axes.plot(ms, y, "o", mfc="none", color=BLUE, ms=5, label=labels[0])
             axes.plot([low_ms, high_ms], [y, y], color=BLUE, lw=4, alpha=0.4, label=labels[1])
             axes.plot([high_ms, most_ms], [y, y], color=VERMILION, lw=1, label=labels[2])
+            axes.annotate(
+                one.name, (most_ms, y), xytext=(4, 0), textcoords="offset points", fontsize=7,
+                color=INK, va="center",
+            )  # fmt: skip
         _name_presets(axes, presets)
         axes.set_xlabel("ms from contact to report on the board (half a period, scan, solve, link)")
         axes.set_ylabel("mean MIoU of the solver's image")
+        axes.margins(x=0.25, y=0.1)
         axes.set_xlim(left=0)
-        axes.margins(y=0.1)
         plain_axes(axes)
         legend_below(figure, axes, 2)
         axes.set_title("The board at 60 dB: Pareto-optimal settings and presets, bounds of time")
@@ -183,7 +187,7 @@ def _name_presets(axes: Axes, presets: dict[str, OperatingPoint]) -> None:
         if one.instructions is not None:
             x, y = _board_ms(one)[0], one.accuracy(Conditions()) or 0.0
             axes.annotate(
-                ", ".join(names[name]), (x, y), xytext=(0, 9), textcoords="offset points",
-                ha="center", fontweight="bold", color=INK,
+                ", ".join(names[name]), (x, y), xytext=(0, -9), textcoords="offset points",
+                ha="center", va="top", fontweight="bold", color=INK,
             )  # fmt: skip
             axes.plot(x, y, "o", ms=11, mfc="none", mec=INK, mew=1.4)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TARGETS = {"Gauss-Newton": 0.75, "eitskin, solver's image": 0.85, "eitskin, image shown": 0.95}
-SCENES, SNR_DB, SEED, ELEMENTS = 24, 60.0, 1, 6000
+SCENES, SNR_DB, SEED, ELEMENTS = 400, 60.0, 1, 6000
 BOTH, FALSE, MISSED = "#0072b2", "#e69f00", "#8a8a8a"
 LABELS = {"in both": BOTH, "only in the image": FALSE, "only in the truth": MISSED}
 
@@ -47,8 +47,8 @@ class _Shown:
 
 
 def draw_miou(path: Path, progress: Progress = silent) -> None:
-    """The images by the methods of ``TARGETS`` of the scene in which they come nearest to these
-    MIoU, and what of them counts.
+    """The images by the methods of ``TARGETS`` of the scene of two or three touches in which they
+    come nearest to these MIoU, and what of them counts.
 
     Raises:
         MissingExtraError: matplotlib or the mesher is not installed.
@@ -57,7 +57,8 @@ def draw_miou(path: Path, progress: Progress = silent) -> None:
     matplotlib = load_matplotlib()
     model, _ = load_prebuilt()
     scorer = metrics.judge_for(model.skin.outline, model.grid)
-    chosen = min(_images(scorer, progress), key=_distance)
+    several = [one for one in _images(scorer, progress) if len(one[0].scene.touches) > 1]
+    chosen = min(several, key=_distance)
     with matplotlib.rc_context(STYLE):
         figure = matplotlib.figure.Figure(figsize=(8.4, 4.9), layout="constrained")
         axes = figure.subplots(2, 1 + len(chosen))

@@ -68,6 +68,8 @@ def reached(front: Front) -> list[Reached]:
 
 def _others(peers: Sequence[dict[str, Any]]) -> list[Reached]:
     scans = {scan.name: scan for scan in SCANS}
+    timed = [one for one in peers if "host_us" in one]
+    fastest = _fastest(timed)
     return [
         Reached(
             one["name"],
@@ -77,12 +79,25 @@ def _others(peers: Sequence[dict[str, Any]]) -> list[Reached]:
             one["low"],
             one["high"],
             one["worst_tenth"],
-            one["host_us"],
-            one["host_most_us"],
+            fastest[one["name"], one["value"]]["host_us"],
+            fastest[one["name"], one["value"]]["host_most_us"],
         )
-        for one in peers
-        if "host_us" in one
+        for one in timed
     ]
+
+
+def _fastest(timed: Sequence[dict[str, Any]]) -> dict[tuple[str, float], dict[str, Any]]:
+    """Return the fastest measurement of each method with each parameter.
+
+    A method's work per frame depends on its parameter alone, because a half scan copies its rows to
+    the reciprocal ones. Other programs on the machine can only slow a measurement down.
+    """
+    found: dict[tuple[str, float], dict[str, Any]] = {}
+    for one in timed:
+        key = one["name"], one["value"]
+        if key not in found or one["host_us"] < found[key]["host_us"]:
+            found[key] = one
+    return found
 
 
 def _ours(front: Front) -> list[Reached]:
@@ -122,22 +137,23 @@ def _on_scan(points: Sequence[OperatingPoint], base: str, scan: Scan) -> Operati
 
 
 def equal_table(front: Front) -> Tabular:
-    """A row a method: the time of a frame on the host, then image MIoU at each SNR on each scan,
-    and the mean of the worst 10 % of the full scan with 80 samples at 60 dB."""
+    """A row for each method: the time of a frame on the host, then image MIoU at each SNR on each
+    scan, and the mean of the worst 10 % at each SNR on the full scan with 80 samples."""
     every = reached(front)
     snrs_db = sorted({one.snr_db for one in every})
     at = {(one.name, one.scan, one.snr_db): one for one in every}
     shown = " / ".join(f"{snr:g}" for snr in snrs_db)
     head = (
         "method", "frame on the host, us: median / slowest",
-        *(f"{scan.name}: {shown} dB" for scan in SCANS), "worst 10 %, 60 dB",
+        *(f"{scan.name}: {shown} dB" for scan in SCANS),
+        f"worst 10 %, {SCANS[0].name}: {shown} dB",
     )  # fmt: skip
     rows = []
     for name in dict.fromkeys(one.name for one in every):
         first = at.get((name, SCANS[0], 60.0))
         if first is None:
             continue
-        worst = "-" if first.worst_tenth is None else _share(first.worst_tenth)
+        worst = [at.get((name, SCANS[0], snr)) for snr in snrs_db]
         cells = [
             " / ".join(
                 _share(at[name, scan, snr].mean) if (name, scan, snr) in at else "-"
@@ -147,7 +163,11 @@ def equal_table(front: Front) -> Tabular:
         ]
         slowest = "-" if first.most_us is None else f"{first.most_us:.0f}"
         times = f"{first.frame_us:.0f} / {slowest}"
-        rows.append((name, times, *cells, worst))
+        shares = " / ".join(
+            "-" if one is None or one.worst_tenth is None else _share(one.worst_tenth)
+            for one in worst
+        )
+        rows.append((name, times, *cells, shares))
     return head, rows
 
 
