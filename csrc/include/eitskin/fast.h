@@ -196,7 +196,8 @@ size_t eits_fast_size(const eits_model *model);
 eits_status eits_fast_init(void *memory, size_t size, const eits_context *ctx, eits_fast **fast);
 
 /* Begin with the context's present reference, and without touches from drives. Errors:
- * EITS_E_ARGUMENT; EITS_E_NO_REFERENCE if the context has no reference, or one without noise. */
+ * EITS_E_ARGUMENT; EITS_E_NO_REFERENCE if the context has no reference; EITS_E_REFERENCE_SHORT if
+ * its noise is unknown, because eits_reference_set took it from one frame. */
 eits_status eits_fast_begin(eits_fast *fast);
 
 /* eits_fast_drives returns the number of drives that can be taken: all of the protocol's, in the

@@ -42,8 +42,9 @@ eits_status eits_reference_set(eits_context *ctx, const eits_real *frame, size_t
  * readings that agree neither with their reciprocals nor with the other frames are left out, and
  * counted (eits_reference_info.outliers). Errors as above; EITS_E_REFERENCE_SHORT if frames are
  * missing, EITS_E_NOT_FINITE if S'y of a frame would not be finite. A frame that is rejected does
- * not count. eits_reference_finish returns EITS_E_REFERENCE_TOUCHED if a touch landed, moved or
- * lifted meanwhile; this needs reciprocal rows and the diagnostic STALE_REFERENCE. */
+ * not count. eits_reference_add returns EITS_E_ARGUMENT without eits_reference_begin before it, and
+ * after `count` frames. eits_reference_finish returns EITS_E_REFERENCE_TOUCHED if a touch landed,
+ * moved or lifted meanwhile; this needs reciprocal rows and the diagnostic STALE_REFERENCE. */
 eits_status eits_reference_begin(eits_context *ctx, uint32_t count);
 eits_status eits_reference_add(eits_context *ctx, const eits_real *frame, size_t length);
 eits_status eits_reference_finish(eits_context *ctx);

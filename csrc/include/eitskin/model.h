@@ -10,7 +10,7 @@
  * Nothing is copied: the view points into the blob, which must stay in place, unchanged, as long as
  * the view is used. Many contexts and threads may share one model. eits_model_open checks the CRC
  * and every length, index and number once, so that nothing has to be checked later. It reads the
- * whole blob, 0.3 MB for the shipped skin. Sections that this version does not know are skipped.
+ * whole blob, 0.37 MB for the shipped skin. Sections that this version does not know are skipped.
  *
  * Dimensions, as in the format's page: the protocol has n_rows rows; averaging reciprocal rows
  * leaves n_folded folded rows. P is rank x n_folded, S is rank x n_pixels.

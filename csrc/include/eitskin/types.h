@@ -35,7 +35,8 @@ typedef float eits_real;
  * eits_info.stop states how it ended. */
 typedef enum eits_status {
     EITS_OK = 0,
-    EITS_E_ARGUMENT = -1,        /* a null pointer, or an option out of its documented range */
+    /* a null pointer, an option out of its documented range, or a call that came too early */
+    EITS_E_ARGUMENT = -1,
     EITS_E_WORKSPACE = -2,       /* the workspace is too small or not 16-byte aligned */
     EITS_E_MODEL_TRUNCATED = -3, /* the blob ends before the size that its header states */
     EITS_E_MODEL_MAGIC = -4,     /* not an .eitm model */
@@ -51,7 +52,8 @@ typedef enum eits_status {
     /* the reference or another frame is all zero, or contains only noise: the front end is dead */
     EITS_E_FRAME_ZERO = -12,
     EITS_E_NO_REFERENCE = -13, /* a frame came before the reference frame was set */
-    /* a reference was finished with fewer frames than it needs */
+    /* a reference was finished with fewer frames than it needs, or its noise is needed and it was
+     * taken from one frame */
     EITS_E_REFERENCE_SHORT = -14,
     /* a result would not be finite; the outputs were cleared instead */
     EITS_E_NOT_FINITE = -15,

@@ -7,7 +7,7 @@ const char *eits_status_text(eits_status status)
     case EITS_OK:
         return "ok";
     case EITS_E_ARGUMENT:
-        return "an argument is null or out of range";
+        return "an argument is null or out of range, or another call has to come first";
     case EITS_E_WORKSPACE:
         return "the workspace is too small or not 16-byte aligned";
     case EITS_E_MODEL_TRUNCATED:

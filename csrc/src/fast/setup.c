@@ -142,9 +142,11 @@ eits_status eits_fast_begin(eits_fast *fast)
         return EITS_E_ARGUMENT;
     const eits_reference *reference = &fast->ctx->reference;
     fast->begun = 0;
-    /* Without noise every residual would be news, and chi-squares infinite. */
-    if (!reference->ready || !(reference->noise_v > 0))
+    if (!reference->ready)
         return EITS_E_NO_REFERENCE;
+    /* Without noise every residual would be news, and chi-squares infinite. */
+    if (!(reference->noise_v > 0))
+        return EITS_E_REFERENCE_SHORT;
     const uint32_t rows = fast->drives > 0 ? fast->model->n_rows : 0;
     eits_real energy = 0;
     /* Copied once: after a tare the caller begins again, so that a touch is never seen by two sets

@@ -125,7 +125,7 @@ def test_mistakes_get_the_answers_of_the_page(one_object, tmp_path):
         "mV": "EITS_OK",
         "option": "EITS_E_ARGUMENT",
         "row": "EITS_E_ARGUMENT",
-        "tracker without noise": "EITS_E_NO_REFERENCE",
+        "tracker without noise": "EITS_E_REFERENCE_SHORT",
     }
     assert numbers == {what: status[name] for what, name in expected.items()}
 

@@ -101,7 +101,7 @@ def test_a_project_for_a_microcontroller_gets_the_core_and_its_kernels(tmp_path)
     (tmp_path / "board.cmake").write_text(BARE_METAL)
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.25)\nproject(user LANGUAGES C)\nset(EITSKIN_M7 ON)\n"
-        f'add_subdirectory("{ROOT}" eitskin EXCLUDE_FROM_ALL)\n'
+        f'add_subdirectory("{ROOT}" eitskin)\n'
         f'add_library(user STATIC "{EXAMPLES}/minimal.c")\n'
         "target_link_libraries(user PRIVATE eitskin::core)\n"
     )

@@ -1,5 +1,6 @@
 // The frame that every model carries for its self-test, from voltages to touches. Make
-// eitskin_model.h with  scripts/embed OUT --model MODEL.eitm  and put your own measure() in place.
+// eitskin_model.h with  scripts/embed OUT --model MODEL.eitm  and
+// give your frame to eits_reconstruct in place of the golden one.
 #include <eitskin.h>
 #include <eitskin_model.h>
 
