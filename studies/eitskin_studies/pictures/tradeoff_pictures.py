@@ -170,7 +170,7 @@ def draw_knobs(path: Path, front: Front) -> None:
             axes.set_ylabel("mean MIoU")
         legend_below(figure, panels[0, 0], 4)
         scenes = f"{front.settings.get('scenes')} scenes of 1 to 3 random touches, 60 dB"
-        figure.suptitle(f"One knob at a time: {scenes}; bars: 95 % interval")
+        figure.suptitle(f"One setting at a time: {scenes}; bars: 95 % interval")
 
 
 def _draw_knob(axes: Axes, groups: Sequence[Sequence[OperatingPoint]], knob: str) -> None:
@@ -218,8 +218,7 @@ def _base_name(group: Sequence[OperatingPoint]) -> str:
 
 
 def draw_noise(path: Path, front: Front) -> None:
-    """The knobs that noise turns: images and discs at each SNR against rank, regularisation and
-    lambda."""
+    """Images and discs at each SNR against rank, regularisation and lambda."""
     with drawing(path, 12.0, 4.6) as figure:
         columns = figure.subplots(1, len(NOISY_KNOBS), sharey=True)
         for axes, knob in zip(columns, NOISY_KNOBS, strict=True):
@@ -230,8 +229,7 @@ def draw_noise(path: Path, front: Front) -> None:
         columns[0].set_ylabel("mean MIoU")
         legend_below(figure, columns[0], 6)
         figure.suptitle(
-            "What noise asks for: fewer directions, a higher regularisation; t is that of training"
-            " scenes at 60 dB"
+            "Rank, regularisation and lambda at each SNR; t is that of training scenes at 60 dB"
         )
 
 
