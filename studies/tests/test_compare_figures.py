@@ -65,14 +65,14 @@ def test_an_empty_image_gives_no_number(targets):
 def families() -> list[Family]:
     return [
         Family("", (0.0,), lambda _, name=name: LinearMethod(name, np.eye(3)))
-        for name in ("Tikhonov", "plain FISTA 30", "eitskin 60, image")
+        for name in ("Tikhonov", "plain FISTA 30", "eitskin 60, image shown")
     ]
 
 
 def test_methods_are_chosen_by_words_of_their_names():
     assert len(named(families(), [])) == 3
     chosen = named(families(), ["fista", "EITSKIN"])
-    assert [one.make(0.0).name for one in chosen] == ["plain FISTA 30", "eitskin 60, image"]
+    assert [one.make(0.0).name for one in chosen] == ["plain FISTA 30", "eitskin 60, image shown"]
     with pytest.raises(UsageError, match=r"--methods gpu: .*Tikhonov, plain FISTA 30"):
         named(families(), ["gpu"])
 

@@ -13,7 +13,7 @@ from eitskin.solve.batch import Batch
 from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.compare.families import Family, Setup
 
-SHOWN = {"image": "image", "solver": "solver's image", "discs": "touches as discs"}
+SHOWN = {"image": "image shown", "solver": "solver's image", "discs": "touches as discs"}
 
 
 class CoreMethod:

@@ -42,8 +42,8 @@ CURVES = {
     "plain FISTA 30, non-negative": ORANGE,
     "plain FISTA 300, non-negative": VERMILION,
     "plain FISTA 3000, non-negative": BLACK,
-    "eitskin 60, image": BLUE,
-    "eitskin 60, touches as discs": BLUE,
+    "eitskin 60, solver's image": BLUE,
+    "eitskin 60, image shown": BLUE,
 }  # the methods that have a curve and a column of images
 PANEL_INCH = 1.15
 
@@ -127,7 +127,7 @@ def draw_curves(path: Path, data: Mapping[str, Any]) -> None:
             for one in data["methods"]:
                 name, values = one["name"], one[curve]
                 ours = name.startswith("eitskin")
-                axes.plot(ts, values, "--" if name.endswith("discs") else "-", label=name,
+                axes.plot(ts, values, "--" if name.endswith("shown") else "-", label=name,
                           color=CURVES[name], linewidth=2.0 if ours else 1.2)  # fmt: skip
                 t = data["fixed_threshold"] if curve == "fixed_curve" else one["threshold"]
                 axes.plot(t, values[ts.index(t)], "o", color=CURVES[name], markersize=4)

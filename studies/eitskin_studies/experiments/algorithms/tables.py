@@ -138,7 +138,7 @@ def _thresholds(results: Sequence[AlgorithmResult]) -> tuple[tuple[str, ...], ..
 def _explained(results: Sequence[AlgorithmResult]) -> list[AlgorithmResult]:
     wanted = ("Gauss-Newton (Tikhonov)", "NOSER", "plain FISTA 30, non-negative",
         "plain FISTA 300, non-negative",
-              "plain FISTA 3000, non-negative", "eitskin 60, image")  # fmt: skip
+              "plain FISTA 3000, non-negative", "eitskin 60, solver's image")  # fmt: skip
     return [one for one in results if one.candidate.name in wanted]
 
 
@@ -183,16 +183,16 @@ def _verdict(results: Sequence[AlgorithmResult]) -> str:
     fista = [by_name[f"plain FISTA {k}, non-negative"] for k in (30, 300, 3000)]
     fixed = " / ".join(short(one.at_fixed().mean) for one in fista)
     chosen = " / ".join(short(one.at_best().mean) for one in fista)
-    own = by_name["eitskin 60, image"]
+    own = by_name["eitskin 60, solver's image"]
     times = fista[-1].kmacs / own.kmacs
     return (
         f"At t = {FIXED_THRESHOLD:g} Gauss-Newton, conjugate gradient and NOSER have an MIoU of"
         f" {short(low)} to {short(high)}, whatever their parameter (the paper: 0.4 to 0.5). With"
         f" the parameter and the t that are best for each, they have: {best}. Plain non-negative"
         f" FISTA has {fixed} at t = {FIXED_THRESHOLD:g} after 30 / 300 / 3,000 iterations, and"
-        f" {chosen} with its best parameter and t (the paper: 0.84). eitskin's image has"
-        f" {short(own.at_best().mean)}, and its touches, drawn as discs, have"
-        f" {short(by_name['eitskin 60, touches as discs'].at_best().mean)}. eitskin takes"
+        f" {chosen} with its best parameter and t (the paper: 0.84). The image of eitskin's solver"
+        f" has {short(own.at_best().mean)}, and the image that eitskin shows has"
+        f" {short(by_name['eitskin 60, image shown'].at_best().mean)}. eitskin takes"
         f" {own.kmacs:,.0f} thousand multiply-accumulates per frame; 3,000 plain iterations take"
         f" {times:,.0f} times as many."
     )
