@@ -70,6 +70,21 @@ def test_the_measured_numbers_of_each_aim_are_on_the_pages_that_its_line_links_t
         assert _numbers(row.strip("|").split("|")[-1]) - known == set(), row
 
 
+def test_what_the_papers_claims_are_compared_with_is_on_the_pages_that_their_lines_link_to():
+    text = (RESULTS / "paper.md").read_text(encoding="utf-8")
+    rows = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("| ")]
+    ours = [row[2] for row in rows if len(row) == 4]
+    compared = [(one, re.findall(r"\]\((\w+\.md)\)", one)) for one in ours]
+    compared = [(one, pages) for one, pages in compared if pages]
+    assert len(compared) >= 5
+    for one, pages in compared:
+        known = set()
+        for page in (RESULTS / name for name in pages):
+            for path in (page, file_of(page)):
+                known |= _numbers(path.read_text(encoding="utf-8"))
+        assert _numbers(one) - known == set(), one
+
+
 def test_the_sentences_to_doubt_have_the_numbers_of_the_pages_they_link_to():
     rows = _rows("Ten sentences to doubt first")
     assert len(rows) == 10
