@@ -19,7 +19,8 @@ LINES = {
     "working-set": ("FISTA on a working set (numbers: iterations)", BLUE, "o-"),
     "active-set": ("active set (numbers: kMAC at most)", VERMILION, "s-"),
 }
-ABOVE, BELOW = 6, -11  # points
+ABOVE, BELOW, LEFT = (0, 6), (6, -13), (-6, -2)  # of the numbers, in points
+RISING = 60  # iterations; before it the line is steep, and its numbers stand on its left
 
 
 def draw_suboptimality(path: Path, curves: Mapping[str, Any]) -> None:
@@ -37,14 +38,15 @@ def draw_suboptimality(path: Path, curves: Mapping[str, Any]) -> None:
             axes.plot(*zip(*places, strict=True), style, color=colour, label=name, ms=4, lw=1.2)
             if solver == "fista":
                 continue
-            for number, (one, place) in enumerate(zip(stops, places, strict=True)):
+            for one, place in zip(stops, places, strict=True):
                 effort = one["effort"] or 0
                 shown = effort // 1000 if solver == "active-set" else effort
-                below = solver == "active-set" and number % 2
+                where, aligned = BELOW if solver == "active-set" else ABOVE, "center"
+                if solver == "working-set" and effort < RISING:
+                    where, aligned = LEFT, "right"
                 axes.annotate(
                     str(shown) if effort else "optimum", place, color=colour, fontsize=7,
-                    xytext=(0, BELOW if below else ABOVE), textcoords="offset points",
-                    ha="center",
+                    xytext=where, textcoords="offset points", ha=aligned,
                 )  # fmt: skip
         axes.set_xscale("log")
         axes.invert_xaxis()
