@@ -271,7 +271,7 @@ def draw_doubt(path: Path, data: Mapping[str, Any]) -> None:
             _bars(axes, group)
             axes.set_xlabel(group["title"])
         panels[0].set_ylabel("share of frames")
-        panels[0].set_title("crowded", loc="left")
+        panels[0].set_title("the report 'crowded'", loc="left")
         legend_below(figure, panels[0], 3)
         for name, curve in data["curves"].items():
             colour = SNR_COLOURS[float(name)]
@@ -281,7 +281,9 @@ def draw_doubt(path: Path, data: Mapping[str, Any]) -> None:
                 last.plot(*curve["crowded"], "X", color=colour, markersize=8, markeredgecolor=INK)
         last.set(xlabel="share of frames without a report", ylim=(0, 1.03), xlim=(0, 1.03))
         last.set_ylabel("share of these that are exact")
-        last.set_title("lines: score; crosses: crowded", loc="left")
+        last.set_title(
+            "lines: reported by the score\ncrosses: reported as 'crowded'", loc="left", fontsize=9
+        )
         last.legend(frameon=False, fontsize=8, loc="lower left")
         for axes in (*panels, last):
             plain_axes(axes)
