@@ -147,3 +147,26 @@ def test_bad_frames_and_parameters_are_refused():
     blind[:, 3] = 0
     with pytest.raises(UsageError, match="pixel 3"):
         baselines.noser(blind, 0.1)
+
+
+def test_total_variation_of_a_step_brings_both_levels_together():
+    """Without a forward model, the edges of a step between two halves of k x k pixels cost k times
+    its height, so that each half moves by weight k / (k k / 2)."""
+    k, weight = 6, 0.05
+    number = np.arange(k * k).reshape(k, k)
+    step = np.where(np.arange(k) < k // 2, 0.3, 1.0) * np.ones((k, 1))
+    method = baselines.TotalVariation(
+        np.eye(k * k), baselines.neighbours(number), weight, iterations=2000
+    )
+    (image,) = method.reconstruct(step.reshape(1, -1))
+    moved = 2 * weight / k
+    expected = np.where(step > 0.5, 1.0 - moved, 0.3 + moved)
+    assert image.reshape(k, k) == pytest.approx(expected, abs=1e-6)
+    assert (method.reconstruct(-step.reshape(1, -1)) == 0).all()
+
+
+def test_edges_are_between_kept_pixels_and_weights_are_above_0():
+    edges = baselines.neighbours(np.array([[0, 1], [-1, 2]])).toarray()
+    assert edges.tolist() == [[-1, 1, 0], [0, -1, 1]]
+    with pytest.raises(UsageError, match="weight above 0"):
+        baselines.TotalVariation(np.eye(3), edges, 0.0)

@@ -63,3 +63,4 @@ def test_it_is_among_the_methods_that_are_compared(setup):
     names = [family.make(family.values[0]).name for family in methods(setup)]
     assert len(set(names)) == len(names)
     assert any(name.startswith("eitskin 30, solver's image") for name in names) and "NOSER" in names
+    assert "total variation, non-negative" in names

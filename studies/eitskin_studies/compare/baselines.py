@@ -12,6 +12,7 @@ matrix products, all of J's rows taken; what is made once for a skin is not coun
     GREIT-like               one matrix, trained to show small targets as blurred discs: greit.py
     conjugate gradient       CGLS, stopped after a few steps: the stop is the regularisation
     plain FISTA              min 1/2 |J x - dv|^2 + lambda |x|_1, signed or x >= 0, K iterations
+    total variation          few edges between pixels and x >= 0, by ADMM
 """
 
 from dataclasses import dataclass
@@ -19,8 +20,9 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import csr_matrix
 
-from eitskin.arrays import BoolArray, FloatArray
+from eitskin.arrays import BoolArray, FloatArray, IntArray
 from eitskin.errors import FrameError, UsageError
 
 
@@ -241,3 +243,81 @@ class PlainFista:
             ahead = new + ((t - 1.0) / t_new) * (new - image)
             image, t = new, t_new
         return image
+
+
+def neighbours(number: IntArray) -> csr_matrix:
+    """The differences (edges, pixels) between kept pixels that share an edge. ``number`` (rows,
+    columns) has the place of each pixel in images, -1 where none is kept (``Grid.number``)."""
+    sides = ((number[:, :-1], number[:, 1:]), (number[:-1], number[1:]))
+    pairs = np.concatenate([np.stack(side, axis=-1).reshape(-1, 2) for side in sides])
+    pairs = pairs[(pairs >= 0).all(axis=1)]
+    edge = np.arange(len(pairs))
+    signs = np.repeat([-1.0, 1.0], len(pairs))
+    where = (np.tile(edge, 2), pairs.T.ravel())
+    return csr_matrix((signs, where), shape=(len(pairs), int(number.max()) + 1))
+
+
+@dataclass(frozen=True, eq=False)
+class TotalVariation:
+    """x >= 0 of the least |A x - d|^2 / 2 + weight sum |differences of x|, where A = J / s_1 and d
+    is dv / s_1, scaled so that max |A'd| is 1, by ADMM (S. Boyd et al., Found. Trends Mach. Learn.
+    3 (2011) 1-122, doi 10.1561/2200000016) on x, its differences z and a copy w of x that is not
+    negative.
+
+    Attributes:
+        jacobian: J (m, n).
+        edges: the differences, of :func:`neighbours`.
+        weight: above 0.
+        iterations: of ADMM; small weights have not converged after 200.
+    """
+
+    jacobian: FloatArray
+    edges: csr_matrix
+    weight: float
+    iterations: int = 200
+    name: str = "total variation, non-negative"
+
+    def __post_init__(self) -> None:
+        if not (self.weight > 0 and self.iterations >= 1):
+            raise UsageError(
+                f"total variation needs a weight above 0, not {self.weight!r}, and at least 1"
+                " iteration"
+            )
+
+    @property
+    def macs(self) -> int:
+        """Multiply-accumulates a frame in products with J' and with the inverse."""
+        return self.jacobian.size + self.iterations * int(self.jacobian.shape[1]) ** 2
+
+    @property
+    def penalty(self) -> float:
+        """ADMM's penalty on its constraints."""
+        return 50.0 * self.weight
+
+    @cached_property
+    def inverse(self) -> FloatArray:
+        """(A'A + penalty (D'D + I))^-1, with the differences D; made once for a skin."""
+        a = self.jacobian / np.linalg.norm(self.jacobian, 2)
+        constraints = (self.edges.T @ self.edges).toarray() + np.eye(a.shape[1])
+        return np.asarray(np.linalg.inv(a.T @ a + self.penalty * constraints))
+
+    def reconstruct(self, dv: npt.ArrayLike) -> FloatArray:
+        """Images (k, n) of difference frames (k, m), each up to a positive factor of its own; all
+        frames advance together.
+
+        Raises:
+            FrameError: as :func:`difference_frames`.
+        """
+        pull = difference_frames(dv, len(self.jacobian)) @ self.jacobian
+        size = np.maximum(np.abs(pull).max(axis=1, keepdims=True), np.finfo(float).tiny)
+        pull, rho, d = pull / size, self.penalty, self.edges
+        w, off_w = np.zeros_like(pull), np.zeros_like(pull)
+        z, off_z = np.zeros((len(pull), d.shape[0])), np.zeros((len(pull), d.shape[0]))
+        for _ in range(self.iterations):
+            x = (pull + rho * ((d.T @ (z - off_z).T).T + w - off_w)) @ self.inverse
+            steps = (d @ x.T).T + off_z
+            z = np.sign(steps) * np.maximum(np.abs(steps) - self.weight / rho, 0.0)
+            off_z = steps - z
+            w = np.maximum(x + off_w, 0.0)
+            off_w += x - w
+        return np.asarray(w * size)

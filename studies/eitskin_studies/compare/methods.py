@@ -22,6 +22,8 @@ STEPS = (5, 10, 20, 30, 50, 80, 120, 200)
 RATIOS = (1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 # 3,000 iterations take ten times as long as 300, so fewer are tried; the best is often the least
 CONVERGED_RATIOS = (1e-5, 1e-4, 1e-3, 3e-3)
+# of total variation; 3e-7 was worse than 1e-6 at 40, 60 and 80 dB
+WEIGHTS = (1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
 
 
 def methods(
@@ -40,7 +42,8 @@ def methods(
     converged = plain_fista(setup.jacobian, 3000, signed=False, ratios=CONVERGED_RATIOS)
     theirs = pyeit_methods(setup) if find_spec("pyeit") else ()
     learned = () if dataset is None else (learned_family(setup, dataset),)
-    others = (*classic, converged, *theirs, *learned, *returned, *own_methods(setup))
+    variation = total_variation(setup.jacobian, setup.grid)
+    others = (*classic, converged, variation, *theirs, *learned, *returned, *own_methods(setup))
     return (*others, *core_methods(setup, threads))
 
 
@@ -92,4 +95,12 @@ def plain_fista(
         "lambda / lambda_max",
         ratios,
         lambda ratio: baselines.PlainFista(jacobian, iterations, ratio, signed),
+    )
+
+
+def total_variation(jacobian: FloatArray, grid: Grid) -> Family:
+    """The family of ``baselines.TotalVariation`` over ``WEIGHTS``."""
+    edges = baselines.neighbours(grid.number)
+    return Family(
+        "weight", WEIGHTS, lambda weight: baselines.TotalVariation(jacobian, edges, weight)
     )

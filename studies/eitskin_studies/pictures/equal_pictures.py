@@ -16,6 +16,7 @@ from eitskin_studies.pictures.style import (
     GREEN,
     GREY,
     ORANGE,
+    PURPLE,
     SKY,
     VERMILION,
     drawing,
@@ -34,7 +35,11 @@ if TYPE_CHECKING:
 OURS = (BLUE, SKY, GREEN, BLACK)
 MARKERS = dict(zip(SCANS, "osD^", strict=True))
 OTHER = GREY
-NAMED = {"plain FISTA 3000, non-negative": VERMILION, "plain FISTA 300, non-negative": ORANGE}
+NAMED = {
+    "plain FISTA 3000, non-negative": VERMILION,
+    "plain FISTA 300, non-negative": ORANGE,
+    "total variation, non-negative": PURPLE,
+}
 BOARD_LABELS = (
     "mean frame at an instruction per cycle",
     "mean frame, from the optimistic to the pessimistic bound",

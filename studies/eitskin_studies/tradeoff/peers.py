@@ -18,7 +18,12 @@ from eitskin.skin.protocol import Protocol
 from eitskin.skin.skin import Skin
 from eitskin.tuning.configuration import ELEMENTS
 from eitskin_studies.compare.families import Family, Method, Setup, setup_for
-from eitskin_studies.compare.methods import CONVERGED_RATIOS, baseline_methods, plain_fista
+from eitskin_studies.compare.methods import (
+    CONVERGED_RATIOS,
+    baseline_methods,
+    plain_fista,
+    total_variation,
+)
 from eitskin_studies.compare.pyeit_method import pyeit_method
 from eitskin_studies.harness.sessions import FrameSession
 from eitskin_studies.harness.summary import summarise
@@ -45,11 +50,12 @@ SCANS = (
 
 
 def peer_families(setup: Setup) -> Sequence[Family]:
-    """The baselines, of plain FISTA the non-negative one with 300 and with 3,000 iterations, and
-    pyEIT's Gauss-Newton."""
+    """The baselines, of plain FISTA the non-negative one with 300 and with 3,000 iterations, total
+    variation, and pyEIT's Gauss-Newton."""
     *linear, _, _, _, fista = baseline_methods(setup.jacobian, setup.grid)
     converged = plain_fista(setup.jacobian, 3000, signed=False, ratios=CONVERGED_RATIOS)
-    return *linear, fista, converged, pyeit_method(setup)
+    variation = total_variation(setup.jacobian, setup.grid)
+    return *linear, fista, converged, variation, pyeit_method(setup)
 
 
 class Peers:
