@@ -344,27 +344,20 @@ def _peers(workspace: _Desk, skin: Skin, protocol: Protocol) -> list[dict[str, A
     how = workspace.settings
     if not how.peers:
         return []
-    made: list[Peers] = []
-
-    def peers() -> Peers:
-        if not made:
-            made.append(Peers(skin, protocol))
-        return made[0]
-
-    names = workspace.kept({"what": "peers", "scenes": how.scenes}, lambda: list(peers().names))
+    peers = Peers(skin, protocol)
     sessions = workspace.session(TRAIN), workspace.session(HEADLINE)
-    cells = [(scan, snr, name) for scan in SCANS for snr in how.snrs_db for name in names]
+    cells = [(scan, snr, name) for scan in SCANS for snr in how.snrs_db for name in peers.names]
     rows = []
     for scan, snr_db, name in workspace.progress(cells, "other methods"):
         facts = {"what": "peer", "name": name, "scan": vars(scan), "snr_db": snr_db}
         row = workspace.kept(
             facts | {"scenes": how.scenes},
-            partial(lambda *cell: peers().score(cell[0], *sessions, *cell[1:]), name, scan, snr_db),
+            partial(peers.score, name, *sessions, scan, snr_db),
         )
         if how.rounds:
             timed = facts | {"what": "peer, host", "machine": machine(), "rounds": how.rounds}
             cell = (name, row["value"], sessions[1], scan, snr_db, how.rounds)
-            row = row | workspace.kept(timed, partial(lambda *c: peers().time(*c), *cell))
+            row = row | workspace.kept(timed, partial(peers.time, *cell))
         rows.append(row)
     return rows
 
