@@ -18,6 +18,7 @@ class Case:
     id: str
     what: str
     promise: str
+    tried: str
     tests: list[str]
     picture: str | None = None
     peers: list[str] = field(default_factory=list)

@@ -26,8 +26,8 @@ LOST = {
     "bits": "The image with fewer bits",
 }
 PRECISION = (
-    "float32 beside float64: worse conditioned matrices",
-    "float32 beside float64: smaller changes",
+    "Error of float32 for worse conditioned matrices S",
+    "Error of float32 for touches that change the frame less",
 )
 SHOWN = (  # group, which of it, sign looked for, title
     ("on an electrode", 0, "increase", "on an electrode"),
@@ -93,9 +93,11 @@ def draw_losses(path: Path) -> None:
     with row_of(path, 3, 3.0, "change of the image,\nshare of its norm") as row:
         for axes, (kind, values) in zip(row, errors.items(), strict=True):
             axes.plot(LEVELS[kind][1:], values[1:], "o-", color=BLUE)
-            axes.set_ylim(0, 0.26)
+            axes.axhline(0.25, color=VERMILION, linestyle="--", linewidth=1.0)
+            axes.set_ylim(0, 0.28)
             axes.set_xlabel(UNITS[kind], color=INK)
             axes.set_title(LOST[kind])
+        row[0].text(LEVELS["noise"][1], 0.255, "bound", color=VERMILION, fontsize=8)
         row[0].set_xscale("log")
         row[2].invert_xaxis()
 
@@ -103,13 +105,13 @@ def draw_losses(path: Path) -> None:
 def draw_precision(path: Path) -> None:
     """Errors of float32 over the condition number, and over the size of the change."""
     by_number, sizes = by_condition(on_host(condition_steps())[1]), by_change()
-    of_number = {"coefficients": "coefficients", "data": "S x"}
-    of_size = {"image": "image", "data": "reduced data"}
+    of_number = {"coefficients": "the image x", "data": "the data S x that it explains"}
+    of_size = {"image": "the image", "data": "the data that the solver gets"}
     panels = (
         ("condition number of S", CONDITIONS, by_number, of_number),
-        ("size of the change, golden frame: 1", CHANGES, sizes, of_size),
+        ("change of the voltages, 1: as in the model's test frame", CHANGES, sizes, of_size),
     )
-    with row_of(path, 2, 3.2, "difference, share of the norm") as row:
+    with row_of(path, 2, 3.2, "distance from float64,\nshare of the norm") as row:
         for axes, (label, at, errors, lines), title in zip(row, panels, PRECISION, strict=True):
             axes.set_title(title)
             for (name, said), (style, colour) in zip(lines.items(), LINES, strict=True):
