@@ -74,8 +74,8 @@ the scenes. Those of *physics* are simulated on another mesh than the model's, a
 after 64 untouched frames (seed 1). *Problem* has made-up matrices, most of 20 rows and 64 columns,
 with data of two columns and 5 % noise; each is solved with each solver and, in most cases, with
 each of the three signs. *Time* has the linear answers of a small skin with noise of 0.001 rms(V0).
-Hypothesis draws the inputs of *bytes* in the same way in every run, and `scripts/fuzz` looks for
-new ones with libFuzzer ([fuzzing](../../tests/fuzz/README.md))."""
+Hypothesis draws the inputs of *bytes* in the same way in every run, and
+[`scripts/fuzz`](../../scripts/fuzz) looks for new ones with libFuzzer."""
 
 SAID = {
     "frames": "faults of the voltages, from NaN to exchanged wires",
