@@ -139,11 +139,17 @@ def small_blob(
 
 
 @cache
+def tiny() -> Small:
+    """A skin with 8 electrodes and 6 pixels across, and its linear answer."""
+    skin, protocol = small_skin("tiny", disk(DISK_MM), 8), adjacent(8)
+    return Small(skin, protocol, linearise(skin, protocol, pixels_across=6, elements=300))
+
+
+@cache
 def tiny_blob(storage: str = "f32") -> bytes:
     """A model of a few kB, every byte of which can be tried: 8 electrodes, rank 5."""
-    skin, settings = small_skin("tiny", disk(DISK_MM), 8), BuildSettings(rank=5, storage=storage)
-    linear = linearise(skin, adjacent(8), pixels_across=6, elements=300)
-    return encode_model(make_model(skin, adjacent(8), linear, settings))
+    settings = BuildSettings(rank=5, storage=storage)
+    return encode_model(make_model(tiny().skin, tiny().protocol, tiny().linear, settings))
 
 
 @cache

@@ -221,7 +221,8 @@ def main(count: int, names: Sequence[str]) -> None:
     """Reads them; what goes wrong is raised, with the file kept and named."""
     folder = Path(tempfile.mkdtemp())
     (folder / "skin.toml").write_bytes(SKIN)
-    for name in ("skin", "svg", "dxf"):  # whatever is loaded on first use
+    whole_models()  # whatever is made or loaded on first use
+    for name in ("skin", "svg", "dxf"):
         path = folder / FORMATS[name][0]
         path.write_bytes({"skin": SKIN, "svg": CURVES, "dxf": FOREARM}[name])
         FORMATS[name][2](path)

@@ -77,7 +77,7 @@ def test_the_same_session_gives_the_same_bytes(image):
 def test_touches_and_images_are_the_host_s_to_the_bit(image):
     board = power_up(image)
     device = connect(board)
-    check, seen, host = twin_check(device, load_prebuilt()[1], 6, untouched=16)
+    check, seen, host = twin_check(device, load_prebuilt()[1], 6, untouched=8)
     # touches that take longer than a scan cost the next frame, and the one after it has no frame
     # before it to compare with
     assert (check.different, check.alone) == ([], 0) and check.inconclusive <= 1
@@ -139,7 +139,7 @@ def test_frame_rates(image, check_every, rows):
     board = power_up(image)
     device = connect(board)
     device.scan(check_every=check_every)
-    device.tare(16)
+    device.tare(4)
     board.skin.begin(board.clock.now)
     device.stats(reset=True)
     scan_us, frame_us = periods_us(device, 8)

@@ -84,7 +84,7 @@ def _faults(packet: Any) -> list[Fault]:
 def test_a_reading_that_is_off_is_left_out_and_counted(image):
     """One burst of one row at half its amplitude."""
     device = device_before(image, skin_of(scene({}), load_prebuilt()[0].protocol))
-    device.tare(16)
+    device.tare(8)
     board = board_of(device)
     sample, spoiled = board.adc.sample, []
 

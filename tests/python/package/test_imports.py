@@ -3,6 +3,7 @@ come, and the installed packages import nothing that only a checkout has."""
 
 import ast
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -54,10 +55,17 @@ def modules(package: str) -> dict[str, Path]:
     return found
 
 
+@cache
+def import_statements(path: Path) -> list[ast.Import | ast.ImportFrom]:
+    """The file's statements that import, wherever they stand."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
 def imported(path: Path, known: Iterable[str]) -> set[str]:
-    """The modules among ``known`` that the file imports, wherever the statement stands."""
+    """The modules among ``known`` that the file imports."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in import_statements(path):
         if isinstance(node, ast.ImportFrom) and node.module:
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
             names |= {name if name in known else node.module for name in inner}
@@ -135,7 +143,7 @@ def packages_imported(folder: Path) -> dict[str, set[str]]:
     found = {}
     for path in folder.rglob("*.py"):
         names = set()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in import_statements(path):
             if isinstance(node, ast.ImportFrom) and node.module:
                 names.add(node.module.partition(".")[0])
             elif isinstance(node, ast.Import):
