@@ -5,11 +5,16 @@ import os
 import re
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
 
+import eitskin
+from eitskin.cli.main import main
+
 ROOT = Path(__file__).resolve().parents[3]
+PYTHON_PAGE = ROOT / "docs" / "site" / "python.rst"
 # pages that a short run leaves out, and what stands for them there
 CLI = pytest.mark.long("tests/python/cli runs these commands one by one")
 SCENES = pytest.mark.long("tests/python/scene")
@@ -64,6 +69,28 @@ def test_blocks_run(page, tmp_path):
         assert done.returncode == 0, f"{page}:\n{text}\n{done.stdout}\n{done.stderr}"
         ran += 1
     assert ran >= 1
+
+
+def test_the_sites_python_page_has_every_public_name():
+    page = PYTHON_PAGE.read_text(encoding="utf-8")
+    for name in eitskin.__all__:
+        assert f":: eitskin.{name}\n" in page, name
+
+
+@API
+def test_the_examples_of_the_sites_python_page_run(tmp_path, monkeypatch):
+    """One after the other, as one program, with a frames file and the tutorial's skin."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["scene", "run", "two_touch", "-o", "touched.npz"]) == 0
+    skin = re.search("<<'END'\n(.*?)END\n", blocks("docs/guide/tutorial.md")[0][1], re.DOTALL)
+    assert skin is not None
+    Path("patch.toml").write_text(skin[1], encoding="utf-8")
+    page = PYTHON_PAGE.read_text(encoding="utf-8")
+    examples = re.findall(r"^\.\. code-block:: python\n\n((?:   .*\n|\n)+)", page, re.MULTILINE)
+    assert len(examples) >= 5
+    program = compile("".join(map(textwrap.dedent, examples)), str(PYTHON_PAGE), "exec")
+    exec(program, {})
+    assert Path("touches.png").stat().st_size > 1000
 
 
 def test_pages_link_to_files_that_exist():
