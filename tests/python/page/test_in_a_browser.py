@@ -412,6 +412,26 @@ def test_the_mouse_presses_the_simulated_skin(live):
     until(lambda: len(live.touches()) == 2)
 
 
+def test_two_fingers_press_the_skin_on_a_phone(live):
+    live.size(390, 844)
+    until(lambda: live.run("return innerWidth") == 390)
+    fingers = (0.0, 40.0), (-40.0, -40.0)
+
+    def touch(kind: str, places: tuple[tuple[float, float], ...]) -> None:
+        points = [dict(zip("xy", place_on_screen(live, *place), strict=True)) for place in places]
+        numbered = [{"id": number, **point} for number, point in enumerate(points)]
+        live.command("Input.dispatchTouchEvent", type=kind, touchPoints=numbered)
+
+    def found() -> bool:
+        places, expected = live.touches(), sorted([*PLACES, *fingers])
+        return len(places) == 4 and float(np.abs(np.array(places) - expected).max()) < NEAR_MM
+
+    touch("touchStart", fingers)
+    until(found)
+    touch("touchEnd", ())
+    until(lambda: len(live.touches()) == 2)
+
+
 def test_keys_press_and_a_page_that_goes_lifts_its_finger(live, server):
     def press_key(key: str) -> None:
         event = f"new KeyboardEvent('keydown', {{key: '{key}'}})"
