@@ -21,6 +21,7 @@ from test_bytes_frames import FIELDS, ODD_ARRAYS
 from test_bytes_models import resealed, whole_models
 
 from eitskin.core.engine import CoreEngine
+from eitskin.fem import mesh
 from eitskin.frames.frames import load_frames
 from eitskin.frames.layout import load_layout
 from eitskin.model.eitm import load_model
@@ -32,6 +33,7 @@ from eitskin.skin.drawing_shapes import DrawingReading
 from eitskin.skin.protocol import opposite
 from eitskin.skin.skin import load_skin
 from eitskin.teaching.presses import load_presses
+from kept_meshes import mesher_that_keeps
 
 MOST_S, MOST_BYTES = 2.0, 500_000_000
 MAGNITUDES = (b"0", b"1", b"7", b"33", b"1000", b"65537", b"1e6", b"99999999", b"4294967296")
@@ -221,6 +223,7 @@ def main(count: int, names: Sequence[str]) -> None:
     """Reads them; what goes wrong is raised, with the file kept and named."""
     folder = Path(tempfile.mkdtemp())
     (folder / "skin.toml").write_bytes(SKIN)
+    mesh.run_mesher = mesher_that_keeps()
     whole_models()  # whatever is made or loaded on first use
     for name in ("skin", "svg", "dxf"):
         path = folder / FORMATS[name][0]

@@ -20,7 +20,7 @@ def test_a_scene_ends_by_itself(done, tmp_path):
     """That the touches lie where the scene has them is emulator/test_emulated_board.py's."""
     scene = tmp_path / "short.toml"
     scene.write_text('[scene]\nname = "short"\nframes = 4\nelements = 900\n', encoding="utf-8")
-    *frames, summary, solves, _ = done(f"stream --device emu:{scene} -v").splitlines()
+    *frames, summary, solves, _ = done(f"stream --device emu:{scene} --tare 4 -v").splitlines()
     assert 5 <= len(frames) <= 10 and float(frames[-1].split()[1]) < 0.2
     assert summary.startswith(f"{len(frames)} frames, ")
     assert summary.endswith("; 0 gaps (0 packets missing), 0 dropped here, 0 dropped by the board")

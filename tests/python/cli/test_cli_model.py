@@ -132,16 +132,17 @@ def test_building_twice_gives_the_same_bytes(done, tmp_path):
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
-def test_in_a_process_of_its_own(tmp_path):
+def test_in_a_process_of_its_own(done, tmp_path):
     """The module as users run it: exit codes, streams, and output in pipes."""
 
     def ended(*arguments: str) -> tuple[int, str, str]:
         command = [sys.executable, "-m", "eitskin.cli.main", *words(*arguments)]
-        done = run_command(command, cwd=tmp_path)
-        return done.returncode, done.stdout, done.stderr
+        process = run_command(command, cwd=tmp_path)
+        return process.returncode, process.stdout, process.stderr
 
     skin, palm = write_skin(tmp_path), tmp_path / "palm.eitm"
-    code, out, err = ended("model build skin.toml -o palm.eitm --json", *QUICK)
+    done(f"model build {skin} -o {palm}", *QUICK)
+    code, out, err = ended("model info palm.eitm --json")
     assert (code, err) == (0, "") and json.loads(out)["model"] == "palm.eitm"
     skin.write_text(skin.read_text().replace("thickness_mm", "thicknes_mm"))
     said = "skin.toml [skin]: unknown key 'thicknes_mm'; did you mean 'thickness_mm'?"

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from eitskin.device.open import open_device
@@ -22,10 +23,9 @@ def built(cortex_m7) -> Path:
     return cortex_m7 / IMAGE
 
 
-@pytest.mark.parametrize("scene", ["two_touch", "two_touch.toml"])
-def test_a_device_by_its_url(built, scene):
-    with open_device(f"emu:{scene}", image=built) as device:
-        assert device.transport.url == f"emu:{scene}"
+def test_a_device_by_its_url(built):
+    with open_device("emu:two_touch", image=built) as device:
+        assert device.transport.url == "emu:two_touch"
         assert isinstance(device.transport, Transport)
         device.tare(4)
         device.start_scene()
@@ -33,6 +33,12 @@ def test_a_device_by_its_url(built, scene):
         last = [item for item in items if isinstance(item, SolvedTouches)][-1]
         assert len(last.touches) == 2
         assert not device.transport.ended
+        shown = device.transport.board.skin
+    with open_device("emu:two_touch.toml", image=built) as device:
+        assert device.transport.url == "emu:two_touch.toml"
+        same = device.transport.board.skin
+        assert np.array_equal(same.untouched_v, shown.untouched_v)
+        assert np.array_equal(same.frames_v[-1], shown.frames_v[-1])
 
 
 def test_time_is_the_board_s(built):

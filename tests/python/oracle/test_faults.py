@@ -227,17 +227,24 @@ def test_stale_references(sign, times_change):
     assert ("stale reference" in names) == opposite_way  # type: ignore[operator]
 
 
+@cache
+def touched(count: int) -> tuple[AllEngines, FloatArray]:
+    """Engines with a reference, and nine frames of ``count`` touches."""
+    touches = random_touches(paper_skin().outline, 2, 9, "test", TouchRules(count=(count, count)))
+    scenes = simulate(paper_skin(), adjacent(16), touches, measurement=Measurement(snr_db=60.0))
+    made = AllEngines(*prebuilt(), engines=("c", "c64", "numpy"))
+    made.tare(scenes.untouched_v.astype(np.float32).astype(float))
+    return made, scenes.frames_v
+
+
 @pytest.mark.parametrize("scale", [0.1, 3.0, 30.0, 1e3, 1e6])
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_frame_of_another_scale_than_the_reference_is_named(count, scale):
     """With other units, or with a far larger gain than at the tare, touches are lost, because the
     drift of the gain is ignored; this is reported. Frames of a scale that a skin may have cause no
     diagnostic."""
-    touches = random_touches(paper_skin().outline, 2, 9, "test", TouchRules(count=(count, count)))
-    scenes = simulate(paper_skin(), adjacent(16), touches, measurement=Measurement(snr_db=60.0))
-    made = AllEngines(*prebuilt(), engines=("c", "c64", "numpy"))
-    made.tare(scenes.untouched_v.astype(np.float32).astype(float))
-    for frame in scenes.frames_v:
+    made, frames_v = touched(count)
+    for frame in frames_v:
         for name, one in made.items():
             assert "stale reference" in said(one, scale * frame)[3], name  # type: ignore[operator]
             for healthy in (0.7, 1.0, 1.4):

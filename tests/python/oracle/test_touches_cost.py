@@ -7,6 +7,7 @@ version; then this is where its cost is defined.
 """
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ STARTS = 4
 PLAIN = {"touch_test": 0, "touch_fit": 0, "row_gains": 0}  # discs and nothing else: one cost
 
 
+@cache
 def scenes(count: int, snr_db: float) -> tuple[np.ndarray, np.ndarray]:
     """Untouched frames, and five of ``count`` touches each."""
     drawn = random_touches(paper_skin().outline, 11, 5, "test", TouchRules(count=(count, count)))
