@@ -64,6 +64,35 @@ def test_what_is_absent_is_named():
     assert "not installed: celer; run  pip install celer" in bench_solve.text(result)
 
 
+def test_the_page_has_the_times_and_says_which_aims_are_missed(tmp_path):
+    times = {
+        bench_solve.BASE: (24.0, 22.0, 20.0),
+        "SPAMS, float32, Gram, batch of 240": (62.0, 62.0, 62.0),
+        "SPAMS, float32, Cholesky, batch of 240": (61.0, 61.0, 60.0),
+        "celer, float64": (628.0, 1796.0, 3390.0),
+        "scikit-learn, float64": (2085.0, 12885.0, None),
+    }
+    rows = [
+        {"solver": name, "level": level, "reached": us is not None, "us": us}
+        for name, all_us in times.items()
+        for level, us in zip(bench_solve.LEVELS, all_us, strict=True)
+    ]
+    table = {"count": 20, "shape": [64, 812], "nonzeros": 9.5, "rows": rows}
+    result = {
+        "machine": "m", "versions": {"numpy": "2", "celer": "1", "daqp": None}, "seed": 3,
+        "rounds": 11, "tables": [table | {"problems": name} for name in ("rank 64", "rank 104")],
+    }  # fmt: skip
+    page = page_copy(tmp_path, "benchmarks")
+    fill_marks(page, "benchmarks", bench_solve.for_page(result, "the command"))
+    text = page.read_text(encoding="utf-8")
+    assert "By `the command`" in text and "numpy 2, celer 1." in " ".join(text.split())
+    assert "| celer, float64 | 628 | 1796 | 3390 | 3390 |" in text
+    assert "| scikit-learn, float64 | 2085 | 12885 | - | - |" in text
+    assert "| SPAMS | 5 | **3.0** (missed) | **3.0** (missed) |" in text
+    assert "| celer | 100 | 170 | 170 |" in text
+    assert "| scikit-learn | 400 | - | - |" in text and "| DAQP |" not in text
+
+
 def test_the_page_has_the_last_stop_of_each_solver(tmp_path):
     stops = [
         suboptimality.StopPoint(solver, effort, 0.026, 0.862, 0.729, 586_400.0, 0.2)

@@ -1,7 +1,17 @@
 """A frame's time as a range: the table and the sentence about two bounds."""
 
-from eitskin_studies.benchmarks.time_range import BoundedFrame, TimeRange, for_page, table
-from study_pages import page_copy
+import pytest
+
+from eitskin.errors import ConfigError
+from eitskin_studies.benchmarks.time_range import (
+    BoundedFrame,
+    TimeRange,
+    for_page,
+    stored_ratios,
+    table,
+)
+from eitskin_studies.harness.numbers import file_of, keep_numbers
+from study_pages import PAGES, page_copy
 
 
 def frame(bound: str, solve_us: int, switch_us: float, scan: str = "104 rows") -> BoundedFrame:
@@ -36,3 +46,15 @@ def test_the_page_has_the_marks(tmp_path):
     page = page_copy(tmp_path, "board-cost")
     fill_marks(page, "board-cost", for_page(result(15_000), "eitskin bench time"))
     assert "6.00 to 15.00" in page.read_text(encoding="utf-8")
+
+
+def test_ratios_of_the_bounds_are_those_of_the_stored_times(tmp_path):
+    page = tmp_path / "board-cost.md"
+    keep_numbers(page, "board-cost", for_page(result(15_000), "eitskin bench time"))
+    with pytest.raises(ConfigError, match="studies/run board-cost time"):
+        stored_ratios(file_of(page))
+    head, row = ("storage", "rows x samples", "worst"), ("f32", "104 x 80", "7.50 ms")
+    keep_numbers(page, "board-cost", ({}, {"rates": (head, [row])}))
+    assert stored_ratios(file_of(page)) == pytest.approx((9 / 7.5, 18 / 7.5))
+    low, high = stored_ratios(file_of(PAGES / "board-cost.md"))
+    assert 1 < low < high

@@ -13,11 +13,14 @@ from eitskin.errors import FrameError, UsageError
 from eitskin.scoring.metrics import raster_inside
 from eitskin.skin.protocol import adjacent
 from eitskin.skin.skin import paper_skin
+from eitskin_studies.benchmarks import worlds as bench_worlds
+from eitskin_studies.harness.numbers import file_of, stored_filling
 from eitskin_studies.tradeoff.run import RunSettings
 from eitskin_studies.tradeoff.scene_sets import SceneFactory
 from eitskin_studies.worlds.score import as_text, score_set
 from eitskin_studies.worlds.simulate import WorldFactory, draw_touches
 from eitskin_studies.worlds.worlds import WORLDS
+from study_pages import page_copy
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +100,20 @@ def test_the_command_scores_the_core_on_the_sets_that_are_named(capsys):
     (row,) = json.loads(capsys.readouterr().out)
     assert row["name"] == "no_touch" and row["scenes"] == 2
     assert row["exact"][0] >= 0.5
+
+
+def test_fewer_columns_of_the_touch_test_cost_less(tmp_path, monkeypatch):
+    monkeypatch.setattr(bench_worlds, "LIMITED_SETS", ("drift_2_percent_light",))
+    page = page_copy(tmp_path, "board-cost")
+    assert main(["bench", "columns", "--scenes", "3", "--page", str(page)]) == 0
+    _, (texts, tables) = stored_filling(file_of(page))
+    assert "`eitskin bench columns --scenes 3 --seed 1`: 3 scenes" in texts["columns-run"]
+    head, rows = tables["columns"]
+    assert head[-1] == "`drift_2_percent_light`"
+    assert [row[0] for row in rows] == ["0 (no limit)", "200", "30"]
+    means = [float(row[1]) for row in rows]
+    assert means[0] >= means[1] > means[2] > 0
+    assert all(float(row[2]) >= float(row[1]) for row in rows)
 
 
 @pytest.mark.parametrize(

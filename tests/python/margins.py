@@ -1,10 +1,11 @@
 """How near to its bound each hard case came: recorded by tests, gathered over processes, shown at
-the end of a run, and written to the file that ``EITSKIN_MARGINS_FILE`` names. ``conftest.py`` takes
-the hooks from here."""
+the end of a run, and written with the commit to the file that ``EITSKIN_MARGINS_FILE`` names.
+``conftest.py`` takes the hooks from here."""
 
 import json
 import os
 import shutil
+import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,6 +18,9 @@ import pytest
 TARGETS = ("host f32", "host f64", "M7")
 FOLDER = "EITSKIN_MARGINS"  # of a run: workers of pytest-xdist inherit the environment
 FILE = "EITSKIN_MARGINS_FILE"
+MEASURED = ("csrc", "python", "tests/python/hard_cases", ":(exclude)*/front.json",
+            ":(exclude)*/margins.json")  # fmt: skip
+"""What margins depend on, as git names it in the root of the checkout; not what was measured."""
 
 
 def share(measured: float, bound: float) -> float:
@@ -73,6 +77,18 @@ class Margins:
         self.worst[case, target] = max(self.worst.get((case, target), (-1.0, "")), (used, text))
 
 
+def _commit() -> str:
+    """Return the last commit that changed ``MEASURED``, with "-dirty" if something is not
+    committed."""
+
+    def git(*words: str) -> str:
+        command = ["git", *words, "--", *MEASURED]
+        root = Path(__file__).parents[2]
+        return subprocess.run(command, cwd=root, capture_output=True, text=True, check=True).stdout
+
+    return git("log", "-1", "--format=%h").strip() + "-dirty" * bool(git("status", "--porcelain"))
+
+
 _HERE = Margins()
 
 
@@ -105,7 +121,8 @@ def pytest_terminal_summary(terminalreporter):
     if FILE in os.environ:
         rows = [[*key, used, text] for key, (used, text) in sorted(found.worst.items())]
         lines = ",\n".join(json.dumps(row) for row in rows)
-        Path(os.environ[FILE]).write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+        text = f'{{"commit": "{_commit()}", "margins": [\n{lines}\n]}}\n'
+        Path(os.environ[FILE]).write_text(text, encoding="utf-8")
     said: dict[str, dict[str, list[str]]] = {}
     for (case, target), (used, text) in found.worst.items():
         said.setdefault(case, {}).setdefault(f"{100 * used:.3g} % ({text})", []).append(target)

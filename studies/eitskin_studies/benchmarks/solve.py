@@ -25,9 +25,13 @@ from eitskin_studies.benchmarks.solve_peers import (
 )
 from eitskin_studies.benchmarks.solve_problems import Problems, make_problems, models, sessions
 from eitskin_studies.harness.machine import machine
+from eitskin_studies.harness.sections import Filling
 
 LEVELS = (1e-2, 1e-4, 1e-6)
 EQUAL_ITERATIONS = (30, 60, 200)
+BASE = "eitskin active-set, float32"
+AIMS = {"SPAMS": 5, "DAQP": 30, "celer": 100, "scikit-learn": 400}
+"""By these factors ``BASE`` was to be faster at the last level."""
 MAX_S = 3.0
 """A solver that needs longer for one problem has not reached the level."""
 
@@ -146,7 +150,7 @@ def _table(problems: Problems, rounds: int, progress: Progress) -> dict[str, Any
     chosen = candidates(problems)
     plans = [plan for candidate in progress(chosen) for plan in _plan(problems, candidate)]
     _time(plans, rounds, progress)
-    base = {p.level: p for p in plans if p.name == "eitskin active-set, float32"}
+    base = {p.level: p for p in plans if p.name == BASE}
     rows = []
     for plan in plans:
         row: dict[str, Any] = {
@@ -258,3 +262,44 @@ def text(result: dict[str, Any]) -> str:
             ]
             lines.append(f"  {count:4}: " + "; ".join(cells))
     return "\n".join(lines)
+
+
+def _factor(factor: float, aim: float) -> str:
+    number = f"{factor:.1f}" if factor < 10 else f"{factor:.0f}"
+    return number if factor >= aim else f"**{number}** (missed)"
+
+
+def for_page(result: dict[str, Any], command: str) -> Filling:
+    """The marks of studies/results/benchmarks.md that are about times: microseconds of each solver,
+    and the factor between the fastest variant of a program and ``BASE``."""
+    tables, aim = result["tables"], LEVELS[-1]
+    times = [
+        {(row["solver"], row["level"]): row["us"] for row in table["rows"] if row["reached"]}
+        for table in tables
+    ]
+    names = list(dict.fromkeys(row["solver"] for table in tables for row in table["rows"]))
+    head = [f"{table['problems']}: {level:.0e}" for table in tables for level in LEVELS]
+    rows = []
+    for name in names:
+        found = [us.get((name, level)) for us in times for level in LEVELS]
+        rows.append([name, *("-" if one is None else f"{one:.0f}" for one in found)])
+    factors = []
+    for program, least in AIMS.items():
+        cells = []
+        for us in times:
+            ends = [one for (name, level), one in us.items() if level == aim and program in name]
+            cells.append(_factor(min(ends) / us[BASE, aim], least) if ends else "-")
+        if any(program in name for name in names):
+            factors.append([program, f"{least}", *cells])
+    versions = [f"{name} {one}" for name, one in result["versions"].items() if one]
+    counts = ", ".join(f"{table['nonzeros']:.1f} ({table['problems']})" for table in tables)
+    run = (
+        f"By `{command}`: {tables[0]['count']} random scenes (1 to 3 touches, 60 dB, seed"
+        f" {result['seed']}), {tables[0]['shape'][1]} columns; the mean number of non-zeros at the"
+        f" optimum is {counts}. Medians of {result['rounds']} interleaved rounds, and of fewer for"
+        f" slow solvers; {result['machine']}; {', '.join(versions)}."
+    )
+    return {"solve-run": run}, {
+        "solve": (["solver", *head], rows),
+        "factors": (["than", "aim", *(table["problems"] for table in tables)], factors),
+    }

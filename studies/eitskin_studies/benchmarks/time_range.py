@@ -14,7 +14,8 @@ import numpy as np
 from eitskin.device.client import Device
 from eitskin.device.settings import ScanSettings, apply_scan
 from eitskin.device.wire.link_table import Stream
-from eitskin.errors import DeviceError
+from eitskin.errors import ConfigError, DeviceError
+from eitskin_studies.harness.numbers import stored_filling
 from eitskin_studies.harness.sections import Filling, Tabular, text_table
 
 TARE_FRAMES, BEFORE_FRAMES = 8, 2
@@ -174,3 +175,32 @@ def for_page(result: TimeRange, command: str) -> Filling:
         f" are solved at {half.rate_hz:.0f} frames per second."
     )
     return {"time-run": text}, {"time": table(result)}
+
+
+def stored_ratios(path: Path) -> tuple[float, float]:
+    """The optimistic and the pessimistic bound of the time of solve and touches, over the time at
+    an instruction per cycle: half scans in f32, by the stored numbers of board-cost.md.
+
+    Raises:
+        FileError, ConfigError: the file cannot be read, or lacks one of the numbers.
+    """
+    _, (_, tables) = stored_filling(path)
+    try:
+        bounded = _row(tables["time"], {"firmware": "now", "rows": SCANS[1][1]})
+        low, high = (
+            sum(float(bounded[f"{stage}, ms"].split(" to ")[k]) for stage in ("solve", "touches"))
+            for k in (0, 1)
+        )
+        rate = _row(tables["rates"], {"storage": "f32", "rows x samples": "104 x 80"})
+        plain = float(rate["worst"].removesuffix(" ms"))
+    except (KeyError, ValueError, IndexError, StopIteration):
+        raise ConfigError(
+            f"{path}: lacks times of half scans; run  studies/run board-cost time"
+        ) from None
+    return low / plain, high / plain
+
+
+def _row(table: Tabular, cells: dict[str, str]) -> dict[str, str]:
+    head, rows = table
+    named = (dict(zip(head, row, strict=True)) for row in rows)
+    return next(row for row in named if cells.items() <= row.items())

@@ -1,19 +1,29 @@
-"""``eitskin bench worlds``: touches counted in sets of other worlds by the C core."""
+"""``eitskin bench worlds`` and ``bench columns``: touches counted in sets of other worlds by the C
+core."""
 
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from eitskin.arrays import FloatArray
 from eitskin.config import nearest
+from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Options
 from eitskin.errors import UsageError
 from eitskin.model.prebuilt import load_or_prebuilt
 from eitskin.progress import Progress, silent
 from eitskin.solve.reconstructor import Reconstructor
-from eitskin_studies.worlds.score import CoreFinder, WorldScore, score_worlds
+from eitskin_studies.harness.sections import Filling, Tabular, text_table
+from eitskin_studies.worlds.score import CoreFinder, WorldScore, score_set, score_worlds
 from eitskin_studies.worlds.simulate import WorldFactory
 from eitskin_studies.worlds.worlds import WORLDS
+
+LIMITS = (0, 200, 30)  # of columns; 0 is none
+LIMITED_SETS = (
+    "discs_1_to_3", "five_at_2_5_radii", "drift_2_percent_light", "ellipses", "fingers",
+    "two_fingers_16_to_24_mm",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -52,6 +62,98 @@ def run(settings: Settings, progress: Progress = silent) -> list[WorldScore]:
         snr_db=settings.snr_db,
         progress=progress,
     )
+
+
+class _Counting(CoreFinder):
+    """Also keeps the multiply-accumulates of each frame's touches."""
+
+    def __init__(self, solver: Reconstructor) -> None:
+        super().__init__(solver)
+        self.macs: list[int] = []
+
+    def __call__(
+        self, untouched_v: FloatArray, frame_v: FloatArray, step_v: float
+    ) -> tuple[Touch, ...]:
+        found = super().__call__(untouched_v, frame_v, step_v)
+        self.macs.append(self.touch_macs)
+        return found
+
+
+@dataclass(frozen=True)
+class Limited:
+    """The scores of ``LIMITED_SETS`` if the touch test may compute ``columns``, and the
+    multiply-accumulates of the touches of all their frames."""
+
+    columns: int
+    scores: tuple[WorldScore, ...]
+    macs_mean: float
+    macs_most: int
+
+
+@dataclass(frozen=True)
+class ColumnLimits:
+    """All that ``eitskin bench columns`` measures."""
+
+    settings: Settings
+    rows: tuple[Limited, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        rows = [
+            vars(row) | {"scores": [score.as_dict() for score in row.scores]} for row in self.rows
+        ]
+        return {"scenes": self.settings.scenes, "seed": self.settings.seed, "rows": rows}
+
+
+def run_limits(settings: Settings, progress: Progress = silent) -> ColumnLimits:
+    """Score the sets with each of ``LIMITS`` as the option ``test_columns``.
+
+    Raises:
+        GeometryError, MissingExtraError: from simulating.
+    """
+    model, blob, _ = load_or_prebuilt(settings.model)
+    factory, how = WorldFactory(model.skin, model.protocol, settings.cache), settings
+    drawn = [
+        factory.scenes(name, how.scenes, how.seed, family=how.family, progress=progress)
+        for name in how.sets
+    ]
+    rows = []
+    for columns in LIMITS:
+        finder = _Counting(Reconstructor(model, blob=blob))
+        finder.solver.set_options(test_columns=columns)
+        scores = tuple(score_set(finder, scenes) for scenes in drawn)
+        rows.append(Limited(columns, scores, sum(finder.macs) / len(finder.macs), max(finder.macs)))
+    return ColumnLimits(settings, tuple(rows))
+
+
+def limits_table(result: ColumnLimits) -> Tabular:
+    """Millions of multiply-accumulates, and the share of exact scenes in each set."""
+    head = ("`test_columns`", "mean", "worst", *(f"`{name}`" for name in result.settings.sets))
+    rows = []
+    for row in result.rows:
+        shares = [
+            f"{100 * score.exact.mean:.0f} % ({100 * score.interval[0]:.0f} to"
+            f" {100 * score.interval[1]:.0f})"
+            for score in row.scores
+        ]
+        limit = f"{row.columns}" if row.columns else "0 (no limit)"
+        rows.append((limit, f"{row.macs_mean / 1e6:.2f}", f"{row.macs_most / 1e6:.2f}", *shares))
+    return head, rows
+
+
+def limits_text(result: ColumnLimits) -> str:
+    """For a terminal."""
+    return text_table(*limits_table(result))
+
+
+def limits_for_page(result: ColumnLimits, command: str) -> Filling:
+    """The marks of studies/results/board-cost.md."""
+    how = result.settings
+    run = (
+        f"By `{command}`: {how.scenes} scenes of each set, {how.family} family, seed {how.seed},"
+        " the prebuilt model with its other options as they are."
+    )
+    return {"columns-run": run}, {"columns": limits_table(result)}
 
 
 def chosen_sets(text: str | None) -> tuple[str, ...]:

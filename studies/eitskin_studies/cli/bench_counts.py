@@ -159,6 +159,41 @@ def run_worlds(options: argparse.Namespace) -> int:
     return 0
 
 
+def add_columns(what: Any) -> None:
+    """``bench columns``."""
+    parser = what.add_parser(
+        "columns",
+        help="count touches and their cost with other limits of the touch test's columns",
+        description=(
+            "Find the touches of scenes that differ from the model with three values of the option"
+            " test_columns, and count those that are right, and the multiply-accumulates."
+        ),
+    )
+    option(parser, "--scenes", "scenes of each set", default=100)
+    option(parser, "--seed", "seed of all that is random", default=1)
+    option(parser, "--cache DIR", "folder that keeps the simulated frames", Path)
+    add_page_option(parser, "board-cost")
+    parser.set_defaults(run=run_columns)
+
+
+def run_columns(options: argparse.Namespace) -> int:
+    """Count touches with other limits of columns."""
+    from eitskin.cli.progress import named_bar
+    from eitskin.fileio import refuse_unwritable
+    from eitskin_studies.benchmarks import worlds as bench_worlds
+
+    check_within("--scenes", options.scenes, 1, 100_000)
+    check_within("--seed", options.seed, 0, 2**31 - 1)
+    refuse_unwritable(options.page)
+    settings = bench_worlds.Settings(
+        options.scenes, options.seed, "judging", bench_worlds.LIMITED_SETS, cache=options.cache
+    )
+    result = bench_worlds.run_limits(settings, named_bar)
+    command = f"eitskin bench columns --scenes {options.scenes} --seed {options.seed}"
+    filling = bench_worlds.limits_for_page(result, command)
+    return show(options, result, bench_worlds.limits_text(result), filling, "board-cost")
+
+
 def add_limit(what: Any) -> None:
     """``bench limit``."""
     parser = what.add_parser(

@@ -39,7 +39,7 @@ def add_solve(what: Any) -> None:
     option(parser, "--scenes", "problems for each model", default=20)
     option(parser, "--seed", "seed of the scenes", default=3)
     option(parser, "--rounds", "interleaved rounds", default=11)
-    option(parser, "--optimum", "compare suboptimality with MIoU instead; --page is about this")
+    option(parser, "--optimum", "compare suboptimality with MIoU instead")
     add_page_option(parser)
     parser.set_defaults(run=run_solve)
 
@@ -54,11 +54,16 @@ def run_solve(options: argparse.Namespace) -> int:
     refuse_unwritable(options.page)
     if options.optimum:
         return _show_optimum(options)
-    if options.page is not None:
-        raise UsageError("bench solve: --page needs --optimum; times are not on a page")
     from eitskin_studies.benchmarks import solve as bench_solve
+    from eitskin_studies.harness.sections import fill_marks
 
     result = bench_solve.run(options.scenes, options.seed, options.rounds, progress_bar)
+    if options.page is not None:
+        command = (
+            f"eitskin bench solve --scenes {options.scenes} --seed {options.seed} --rounds"
+            f" {options.rounds}"
+        )
+        fill_marks(options.page, "benchmarks", bench_solve.for_page(result, command))
     print(json.dumps(result, indent=2) if options.json else bench_solve.text(result))
     return 0
 

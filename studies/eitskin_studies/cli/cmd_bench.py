@@ -28,5 +28,6 @@ def add_parser(subparsers: Any) -> None:
     bench_boards.add_latency(what)
     bench_counts.add_gestures(what)
     bench_counts.add_worlds(what)
+    bench_counts.add_columns(what)
     bench_counts.add_limit(what)
     bench_counts.add_peers(what)

@@ -50,16 +50,22 @@ OTHERS = {
     "latency": "bench latency --presses 200 --emulated 24 --seed 1 --order 'by 7' --page {page}",
     "board-cost": "bench board --scenes 180 --seed 1 --frames 12 --page {page}",
     "time": "bench time --frames 4 --page {results}/board-cost.md",
+    "columns": "bench columns --scenes 100 --seed 1 --cache out/other-worlds/frames"
+    " --page {results}/board-cost.md",
     "energy": "bench energy --page {results}/board-cost.md",
     "outputs": "bench outputs --taps 24 --seconds 20 --load 600 --seed 1 --page {page}",
     "view": "bench view --seconds 30 --page {results}/outputs.md",
     "view-load": "bench view --seconds 300 --load --page {results}/outputs.md",
     "growth": "bench growth --rounds 21 --page {results}/benchmarks.md",
+    "solve": "bench solve --scenes 20 --seed 3 --rounds 11 --page {results}/benchmarks.md",
     "optimum": "bench solve --optimum --scenes 60 --seed 1 --page {results}/benchmarks.md",
 }
 # commands that time this computer, that need what others have filled, or that install the package
 # again if a file changed: one by one, at the end
-ALONE = ("growth", "scene-cost", "energy", "hard-cases", "view", "outputs", "view-load")
+ALONE = (
+    "solve", "growth", "scene-cost", "columns", "energy", "hard-cases", "view", "outputs",
+    "view-load",
+)  # fmt: skip
 # a command that uses the results of another, or that fills a page that it fills
 AFTER = {"belief": "other-worlds", "time": "board-cost"}
 FRAMES = Path("out/other-worlds/frames"), Path("out/belief/frames")  # simulated once for both

@@ -7,9 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eitskin.errors import UsageError
 from eitskin.tuning.front import F767_MHZ, REPORT_US, Conditions, Front, OperatingPoint
 from eitskin.tuning.report_time import report_us
 from eitskin.view.pictures import INK, load_matplotlib
+from eitskin_emulator.core_on_qemu import checkout_root
+from eitskin_studies.benchmarks.time_range import stored_ratios
+from eitskin_studies.harness.numbers import file_of
 from eitskin_studies.pictures.style import (
     BLACK,
     BLUE,
@@ -40,15 +44,8 @@ NAMED = {
     "plain FISTA 300, non-negative": ORANGE,
     "total variation, non-negative": PURPLE,
 }
-BOARD_LABELS = (
-    "mean frame at an instruction per cycle",
-    "mean frame, from the optimistic to the pessimistic bound",
-    "to the slowest frame by the pessimistic bound",
-)
 TICKS_MS = (15, 20, 30, 50, 100, 200, 400)
-# Cycles per instruction of solve and touches: half scans of emu:two_touch take 11.94 to 27.12 ms by
-# the two bounds of board-cost.md, and 10.49 ms at an instruction per cycle.
-BOARD_BOUNDS = (11.94 / 10.49, 27.12 / 10.49)
+BOARD_COST = Path("studies/results/board-cost.md")  # whose stored numbers have the bounds of time
 
 
 def draw_equal(path: Path, front: Front) -> None:
@@ -138,8 +135,8 @@ def _entries(every: Sequence[Reached], named: bool) -> list[tuple[Any, str]]:
 
 
 def draw_board(path: Path, front: Front) -> None:
-    """The board: image MIoU over the time to the report with the range of its times, presets
-    named."""
+    """The board: image MIoU over the time to the report, presets named; in a checkout, whose
+    numbers have the bounds of time, with the range of the times."""
     usable = [one for one in front.points if one.fits_f767 and not one.configuration.warm_start]
     line = pareto(
         usable,
@@ -151,10 +148,11 @@ def draw_board(path: Path, front: Front) -> None:
     shown = {one.name: one for one in (*line, *presets.values()) if one.instructions is not None}
     with drawing(path, 9.0, 5.2) as figure:
         axes = figure.subplots()
-        for number, one in enumerate(shown.values()):
-            ms, low_ms, high_ms, most_ms = _board_ms(one)
+        bounds = _bounds()
+        labels = _board_labels(bounds)
+        for one in shown.values():
+            ms, low_ms, high_ms, most_ms = _board_ms(one, bounds)
             y = one.accuracy(Conditions()) or 0.0
-            labels = BOARD_LABELS if not number else ("", "", "")
             axes.plot(ms, y, "o", mfc="none", color=BLUE, ms=5, label=labels[0])
             axes.plot([low_ms, high_ms], [y, y], color=BLUE, lw=4, alpha=0.4, label=labels[1])
             axes.plot([high_ms, most_ms], [y, y], color=VERMILION, lw=1, label=labels[2])
@@ -162,6 +160,7 @@ def draw_board(path: Path, front: Front) -> None:
                 one.name, (most_ms, y), xytext=(4, 0), textcoords="offset points", fontsize=7,
                 color=INK, va="center",
             )  # fmt: skip
+            labels = ("", "", "")
         _name_presets(axes, presets)
         axes.set_xlabel("ms from contact to report on the board (half a period, scan, solve, link)")
         axes.set_ylabel("mean MIoU of the solver's image")
@@ -172,13 +171,34 @@ def draw_board(path: Path, front: Front) -> None:
         axes.set_title("The board at 60 dB: Pareto-optimal settings and presets, bounds of time")
 
 
-def _board_ms(point: OperatingPoint) -> tuple[float, float, float, float]:
+def _bounds() -> tuple[float, float]:
+    """The bounds of the time over that at an instruction per cycle; both 1 without a checkout."""
+    try:
+        root = checkout_root()
+    except UsageError:
+        return 1.0, 1.0
+    return stored_ratios(file_of(root / BOARD_COST))
+
+
+def _board_labels(bounds: tuple[float, float]) -> tuple[str, str, str]:
+    low, high = bounds
+    return (
+        "mean frame at an instruction per cycle",
+        f"mean frame, from the optimistic to the pessimistic bound ({low:.2f} to {high:.2f} times"
+        " as long)",
+        "to the slowest frame by the pessimistic bound",
+    )
+
+
+def _board_ms(
+    point: OperatingPoint, bounds: tuple[float, float]
+) -> tuple[float, float, float, float]:
     """The report of the mean frame at an instruction per cycle, at the optimistic and at the
     pessimistic bound, and of the slowest frame at that bound."""
     assert point.instructions is not None
     mean_us, most_us = (point.instructions[key] / F767_MHZ for key in ("mean", "most"))
     scan = float(point.costs["acquisition_us"])
-    low, high = BOARD_BOUNDS
+    low, high = bounds
     times = (mean_us, low * mean_us, high * mean_us, high * most_us)
     a, b, c, d = (report_us(scan, us, "f767") / 1e3 for us in times)
     return a, b, c, d
@@ -190,7 +210,7 @@ def _name_presets(axes: Axes, presets: dict[str, OperatingPoint]) -> None:
         names.setdefault(one.name, []).append(name)
     for name, one in {one.name: one for one in presets.values()}.items():
         if one.instructions is not None:
-            x, y = _board_ms(one)[0], one.accuracy(Conditions()) or 0.0
+            x, y = _board_ms(one, (1.0, 1.0))[0], one.accuracy(Conditions()) or 0.0
             axes.annotate(
                 ", ".join(names[name]), (x, y), xytext=(0, -9), textcoords="offset points",
                 ha="center", va="top", fontweight="bold", color=INK,

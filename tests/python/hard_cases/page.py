@@ -4,6 +4,7 @@ runs it and makes the page."""
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -63,7 +64,8 @@ judge frames. *Worse* means that the MIoU of the image fell, and that the progra
 conditions, and what eitskin does.
 
 `scripts/hard-cases` runs all cases, and writes this page, its pictures and the measured margins
-([margins.json](../../tests/python/hard_cases/margins.json)).
+([margins.json](../../tests/python/hard_cases/margins.json)). The margins were measured at
+commit {commit}.
 
 {groups}
 """
@@ -89,8 +91,14 @@ SAID = {
 def margins() -> dict[str, dict[str, tuple[float, str]]]:
     """Return the worst share of the bound and its text, by case and target."""
     found: dict[str, dict[str, tuple[float, str]]] = {}
-    for case, target, used, text in json.loads(MARGINS.read_text(encoding="utf-8")):
+    for case, target, used, text in stored()["margins"]:
         found.setdefault(case, {})[target] = (used, text)
+    return found
+
+
+def stored() -> dict[str, Any]:
+    """Return what a run of the hard cases wrote: the margins, and the commit that it measured."""
+    found: dict[str, Any] = json.loads(MARGINS.read_text(encoding="utf-8"))
     return found
 
 
@@ -153,7 +161,8 @@ def page_text() -> str:
     sizes = {group: sum(case.group == group for case in CASES) for group in GROUPS}
     groups = "\n".join(f"- **{group}** ({sizes[group]}): {SAID[group]}" for group in GROUPS)
     given = sum(bool(case.peers) for case in CASES)
-    lines = [HEAD.format(groups=groups, given=given, cases=len(CASES)).rstrip()]
+    lines = [HEAD.format(groups=groups, given=given, cases=len(CASES), commit=stored()["commit"])]
+    lines[0] = lines[0].rstrip()
     for group in GROUPS:
         lines += [
             "",

@@ -27,7 +27,9 @@ def test_the_page_is_that_of_the_catalogue():
 
 
 def test_margins_are_those_of_the_catalogue():
-    """No case is left of an older catalogue, and every margin was kept."""
+    """No case is left of an older catalogue, every margin was kept, and the commit that measured
+    them has no changes beside it."""
+    assert re.fullmatch("[0-9a-f]{8,}", page.stored()["commit"])
     assert set(page.margins()) <= {case.id for case in CASES}
     worst = [share for of in page.margins().values() for share, _ in of.values()]
     assert len(worst) > 60 and max(worst) <= 1.0
