@@ -58,14 +58,19 @@ def test_the_exponent_of_a_power():
     assert bench_growth.exponent(points, lambda p: p.macs) == pytest.approx(1.5)
 
 
-def test_batches(capsys):
+def test_batches(capsys, tmp_path):
     result = bench_batches.run(16, 2, [1, 2])
     assert [(s.name, s.threads) for s in result.speeds] == [
         ("one after another", 1), ("batch", 1), ("C alone", 1), ("batch", 2), ("C alone", 2),
     ]  # fmt: skip
     assert result.speeds[0].times == 1.0
     assert all(0 < s.least_us <= s.us and s.processor_us > 0 for s in result.speeds)
-    assert main(["bench", "batches", "--frames", "16", "--rounds", "1", "--json"]) == 0
+    page = page_copy(tmp_path, "benchmarks")
+    given = ["bench", "batches", "--frames", "16", "--rounds", "1", "--page", str(page)]
+    assert main([*given, "--json"]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "`eitskin bench batches --frames 16 --rounds 1 --threads 1 2`: 16 frames" in text
+    assert "| C alone | 2 |" in text
     assert json.loads(capsys.readouterr().out)["frames"] == 16
     for arguments in (
         "batches --threads 0",

@@ -3,6 +3,8 @@
 import pytest
 
 from eitskin_studies.benchmarks import kernels as bench_kernels
+from eitskin_studies.harness.sections import fill_marks
+from study_pages import page_copy
 
 OUTPUT = """kernels avx2
 case fma;-;1000;0;0;0;20,20,20
@@ -16,7 +18,7 @@ case dot;-;1;1;1;80;100,100,100
 """
 
 
-def test_the_slowest_of_three_limits():
+def test_the_slowest_of_three_limits(tmp_path):
     width = bench_kernels.judge("f32", OUTPUT)
     assert (width.kernels, width.fma_per_ns, width.chain_ns) == ("avx2", 50.0, 1.0)
     panels, mul, dot = width.judged
@@ -28,6 +30,9 @@ def test_the_slowest_of_three_limits():
     result = bench_kernels.KernelTimes(64, 812, 3, "here", (width, width))
     assert bench_kernels.missed(result, True) == ["mul, 48 columns f32 (f32) 3.0"] * 2
     assert bench_kernels.missed(result, False) == []
+    page = page_copy(tmp_path, "benchmarks")
+    fill_marks(page, "benchmarks", bench_kernels.for_page(result, "the command"))
+    assert "1.2 to 3.0 times their limit in f32" in " ".join(page.read_text().split())
     text = bench_kernels.as_text(result)
     assert "beyond 3 times its limit: mul, 48" in text
     assert "1.25" in text

@@ -18,7 +18,7 @@ from eitskin.solve.reconstructor import Reconstructor
 from eitskin_studies.benchmarks.frame import golden_session
 from eitskin_studies.harness.bare_core import bare_block
 from eitskin_studies.harness.machine import machine
-from eitskin_studies.harness.sections import text_table
+from eitskin_studies.harness.sections import Filling, text_table
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,18 @@ def rows(result: BatchTimes) -> list[tuple[str, ...]]:
 
 def as_text(result: BatchTimes) -> str:
     """For a terminal."""
-    head = (
+    return f"{_conditions(result)}\n{text_table(HEAD, rows(result))}"
+
+
+def _conditions(result: BatchTimes) -> str:
+    return (
         f"{result.frames} frames, {result.rounds} rounds in turns, {result.processors} processors;"
         f" {result.machine}"
     )
-    return f"{head}\n{text_table(HEAD, rows(result))}"
+
+
+def for_page(result: BatchTimes, command: str) -> Filling:
+    """The marks of studies/results/benchmarks.md."""
+    return {"batches-run": f"By `{command}`: {_conditions(result)}."}, {
+        "batches": (HEAD, rows(result))
+    }

@@ -17,7 +17,7 @@ import numpy as np
 from eitskin.errors import UsageError
 from eitskin_emulator.core_on_qemu import checkout_root, need_tools
 from eitskin_studies.harness.machine import machine
-from eitskin_studies.harness.sections import text_table
+from eitskin_studies.harness.sections import Filling, text_table
 
 WIDTHS = ("f32", "f64")
 PEAKS = ("fma", "chain", "read")
@@ -219,12 +219,29 @@ def missed(result: KernelTimes, hot: bool) -> list[str]:
 
 def as_text(result: KernelTimes) -> str:
     """For a terminal."""
-    head = (
-        f"{result.columns} columns of {result.rank}, {result.widths[0].kernels} kernels,"
-        f" {result.rounds} rounds"
-    )
-    head += f"; {result.machine}"
     beyond = "; ".join(missed(result, True)) or "nothing"
     last = f"of what a prepared context calls, beyond {MAX_TIMES:g} times its limit: {beyond}"
     table = text_table(HEAD, rows(result))
-    return "\n".join([head, *map(peaks_text, result.widths), "", table, last])
+    return "\n".join([_conditions(result), *map(peaks_text, result.widths), "", table, last])
+
+
+def _conditions(result: KernelTimes) -> str:
+    return (
+        f"{result.columns} columns of {result.rank}, {result.widths[0].kernels} kernels,"
+        f" {result.rounds} rounds; {result.machine}"
+    )
+
+
+def for_page(result: KernelTimes, command: str) -> Filling:
+    """The marks of studies/results/benchmarks.md: of all kernels that a prepared context calls, how
+    many times their limit they take."""
+    said = []
+    for width in result.widths:
+        times = [one.times for one in width.judged if one.hot]
+        said.append(f"{min(times):.1f} to {max(times):.1f} times their limit in {width.width}")
+    beyond = "; ".join(missed(result, True)) or "none"
+    text = (
+        f"By `{command}`: {_conditions(result)}. The kernels that a frame calls take"
+        f" {' and '.join(said)}. These take more than {MAX_TIMES:g} times: {beyond}."
+    )
+    return {"kernels-run": text}, {"kernels": (HEAD, rows(result))}

@@ -91,12 +91,13 @@ def add_batches(what: Any) -> None:
     option(parser, "--frames", default=1000)
     option(parser, "--rounds", default=9)
     option(parser, "--threads N", None, int, nargs="+", default=[1, 2])
-    option(parser, "--json")
+    add_page_option(parser)
     parser.set_defaults(run=run_batches)
 
 
 def run_batches(options: argparse.Namespace) -> int:
     """Time batches over threads."""
+    from eitskin.fileio import refuse_unwritable
     from eitskin.solve.batch import check_threads
     from eitskin_studies.benchmarks import batches as bench_batches
 
@@ -104,8 +105,14 @@ def run_batches(options: argparse.Namespace) -> int:
     check_within("--rounds", options.rounds, 1, 1000)
     for count in options.threads:
         check_threads(count)
+    refuse_unwritable(options.page)
     result = bench_batches.run(options.frames, options.rounds, options.threads)
-    return show(options, result, bench_batches.as_text(result))
+    command = (
+        f"eitskin bench batches --frames {options.frames} --rounds {options.rounds} --threads"
+        f" {' '.join(map(str, options.threads))}"
+    )
+    filling = bench_batches.for_page(result, command)
+    return show(options, result, bench_batches.as_text(result), filling)
 
 
 def add_kernels(what: Any) -> None:
@@ -122,19 +129,26 @@ def add_kernels(what: Any) -> None:
     option(parser, "--rank", "numbers in a column", default=64)
     option(parser, "--columns", default=812)
     option(parser, "--rounds", default=41)
-    option(parser, "--json")
+    add_page_option(parser)
     parser.set_defaults(run=run_kernels)
 
 
 def run_kernels(options: argparse.Namespace) -> int:
     """Time each kernel beside the machine's peaks."""
+    from eitskin.fileio import refuse_unwritable
     from eitskin_studies.benchmarks import kernels as bench_kernels
 
     check_within("--rank", options.rank, 8, 1024)
     check_within("--columns", options.columns, 48, 20_000)
     check_within("--rounds", options.rounds, 1, 200)
+    refuse_unwritable(options.page)
     result = bench_kernels.run(options.rank, options.columns, options.rounds)
-    return show(options, result, bench_kernels.as_text(result))
+    command = (
+        f"eitskin bench kernels --rank {options.rank} --columns {options.columns} --rounds"
+        f" {options.rounds}"
+    )
+    filling = bench_kernels.for_page(result, command)
+    return show(options, result, bench_kernels.as_text(result), filling)
 
 
 def add_growth(what: Any) -> None:

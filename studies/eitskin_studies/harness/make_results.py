@@ -56,6 +56,9 @@ OTHERS = {
     "outputs": "bench outputs --taps 24 --seconds 20 --load 600 --seed 1 --page {page}",
     "view": "bench view --seconds 30 --page {results}/outputs.md",
     "view-load": "bench view --seconds 300 --load --page {results}/outputs.md",
+    "kernels": "bench kernels --rank 64 --columns 812 --rounds 41 --page {results}/benchmarks.md",
+    "batches": "bench batches --frames 1000 --rounds 9 --threads 1 2"
+    " --page {results}/benchmarks.md",
     "growth": "bench growth --rounds 21 --page {results}/benchmarks.md",
     "solve": "bench solve --scenes 20 --seed 3 --rounds 11 --page {results}/benchmarks.md",
     "optimum": "bench solve --optimum --scenes 60 --seed 1 --page {results}/benchmarks.md",
@@ -63,8 +66,8 @@ OTHERS = {
 # commands that time this computer, that need what others have filled, or that install the package
 # again if a file changed: one by one, at the end
 ALONE = (
-    "solve", "growth", "scene-cost", "columns", "energy", "hard-cases", "view", "outputs",
-    "view-load",
+    "solve", "kernels", "batches", "growth", "scene-cost", "columns", "energy", "hard-cases",
+    "view", "outputs", "view-load",
 )  # fmt: skip
 # a command that uses the results of another, or that fills a page that it fills
 AFTER = {"belief": "other-worlds", "time": "board-cost"}
