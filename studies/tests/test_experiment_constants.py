@@ -3,6 +3,7 @@ product's bits, and what a changed constant does."""
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from eitskin_studies.experiments.constants.sweep import (
     Effect,
     baselines,
     effects_of,
+    judges_of,
     numbers_of,
 )
 from eitskin_studies.experiments.constants.tables import any_change, harm, tables_of, words_of
@@ -115,3 +117,10 @@ def test_a_run_without_the_c_tests_is_refused_before_anything_is_made(tmp_path, 
     with pytest.raises(UsageError, match="cmake --preset host"):
         constants.run(workspace(tmp_path / "out"))
     assert not (tmp_path / "out" / "variant").exists()
+
+
+def test_the_tracker_and_its_search_are_judged_by_scenes_drive_by_drive_alone():
+    scenes = [SimpleNamespace(module=module) for module in (None, "fast", "gesture")]
+    for module, places in (("search", [1]), ("fast", [1]), ("gesture", [0, 2]), ("solve", [0])):
+        constant = next(one for one in constants_of(ROOT) if one.module == module)
+        assert judges_of(constant, scenes) == places

@@ -9,7 +9,7 @@ from eitskin_emulator.core_on_qemu import checkout_root
 from eitskin_studies.experiments.constants.in_time import fast_scenes, gesture_scenes
 from eitskin_studies.experiments.constants.judged import Scene
 from eitskin_studies.experiments.constants.models import of_other_models, of_presses
-from eitskin_studies.experiments.constants.protected import Tests, protecting, test_programs
+from eitskin_studies.experiments.constants.protected import Tests, protecting, test_objects
 from eitskin_studies.experiments.constants.scenes import SceneMaker
 from eitskin_studies.experiments.constants.sweep import Effect, baselines, effects_of
 from eitskin_studies.experiments.constants.tables import (
@@ -32,7 +32,7 @@ def run(workspace: Workspace) -> ExperimentOutcome:
             measured presses are given.
     """
     began = time.process_time()
-    test_programs()  # refused now, not after the sweep
+    test_objects()  # refused now, not after the sweep
     variant = build_variant(workspace.folder / "variant", checkout_root())
     scenes = _scenes(SceneMaker.of(workspace))
     known = baselines(variant, scenes)

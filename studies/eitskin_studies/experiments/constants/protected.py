@@ -1,8 +1,8 @@
 """Finds the C tests that fail if a constant is halved or doubled: a promise may depend on a
 constant that changes no evaluation scene.
 
-The tests of the preset `host` take the core from a shared library. They are run with a variant in
-its place, whose constants an environment variable sets. A test is run only where it uses the
+The object files of the preset `host` are linked once more, with a variant of the core as a shared
+library, whose constants an environment variable sets. A test is run only where it uses the
 constant.
 """
 
@@ -22,6 +22,7 @@ from eitskin_studies.experiments.constants.variant import (
 )
 
 LIBRARY = "libeitskin_f32.so"
+HELPERS = "libeitskin_test_f32.a"
 LONGEST_S = 60.0
 # sets a constant before a test begins, and says at its end which were used
 _HOOKS = """
@@ -66,15 +67,30 @@ class Tests:
     """The C tests of the core in float32.
 
     Raises:
-        UsageError: they are not built.
+        UsageError: they are not built, or none of them runs with the variant.
     """
 
     def __init__(self, folder: Path) -> None:
-        root, programs = checkout_root(), test_programs()
+        root, objects = checkout_root(), test_objects()
         self._folder = folder
         sources = write_sources(folder, root, constants_of(root), _HOOKS)
         compile_sources(folder / LIBRARY, folder, root, sources, ())
+        programs = [self._linked(one) for one in objects]
         self.tests = [one for one in map(self._tested, programs) if one is not None]
+        if not self.tests:
+            raise UsageError("constants: no C test of the core passes with the variant of the core")
+
+    def _linked(self, test: Path) -> Path:
+        """The program of a test's object file and the variant."""
+        program = self._folder / test.name.removesuffix(".c.o")
+        helpers = test.parents[2] / HELPERS
+        library = [f"-L{self._folder}", f"-l:{LIBRARY}", f"-Wl,-rpath,{self._folder.resolve()}"]
+        command = ["cc", str(test), str(helpers), *library, "-lm", "-o", str(program)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            errors = done.stderr.strip().splitlines() or ["no message"]
+            raise UsageError(f"constants: {test.name} does not link with the variant: {errors[0]}")
+        return program
 
     def _tested(self, program: Path) -> Tested | None:
         """None if it fails with the variant at the table's values: it has a constant of its own or
@@ -95,7 +111,7 @@ class Tests:
         ]
 
     def _passes(self, program: Path, **more: str) -> bool:
-        environment = {**os.environ, "LD_LIBRARY_PATH": str(self._folder), **more}
+        environment = {**os.environ, **more}
         try:
             done = subprocess.run(
                 [program], env=environment, capture_output=True, check=False, timeout=LONGEST_S,
@@ -106,19 +122,20 @@ class Tests:
         return done.returncode == 0
 
 
-def test_programs() -> list[Path]:
-    """The C tests of the core in float32, as the preset `host` builds them.
+def test_objects() -> list[Path]:
+    """The object files of the core's C tests in float32, as the preset `host` builds them.
 
     Raises:
         UsageError: they are not built.
     """
-    programs = sorted((checkout_root() / "build" / "host" / "tests" / "c").glob("test_*_f32"))
-    if not programs:
+    tests = checkout_root() / "build" / "host" / "tests" / "c"
+    objects = sorted((tests / "CMakeFiles").glob("test_*_f32.dir/test_*.c.o"))
+    if not objects or not (tests / HELPERS).exists():
         raise UsageError(
             "constants: the C tests are not built; run  cmake --preset host && cmake --build"
             " --preset host  in the checkout's root"
         )
-    return programs
+    return objects
 
 
 def protecting(tests: Tests, constants: Sequence[Constant]) -> dict[str, list[str]]:

@@ -18,6 +18,8 @@ from eitskin_studies.experiments.constants.judged import Runner, Scene, Score
 from eitskin_studies.experiments.constants.variant import Constant, Variant
 
 LONGEST_S = 120.0
+# modules that only the scenes drive by drive judge; these name the first as theirs
+IN_TIME = ("fast", "search")
 
 
 @dataclass(frozen=True)
@@ -78,13 +80,18 @@ def baselines(variant: Variant, scenes: Sequence[Scene]) -> list[Baseline]:
     return found
 
 
+def judges_of(constant: Constant, scenes: Sequence[Scene]) -> list[int]:
+    """The places of the scenes by which a constant is judged."""
+    if constant.module in IN_TIME:
+        return [k for k, one in enumerate(scenes) if one.module == IN_TIME[0]]
+    return [k for k, one in enumerate(scenes) if one.module in (None, constant.module)]
+
+
 def effects_of(
     constant: Constant, variant: Variant, scenes: Sequence[Scene], known: Sequence[Baseline]
 ) -> list[Effect]:
     """Return the effects of the half and of the double."""
-    judging = [k for k, one in enumerate(scenes) if one.module in (None, constant.module)]
-    if constant.module == "fast":
-        judging = [k for k in judging if scenes[k].module == "fast"]
+    judging = judges_of(constant, scenes)
     using = [k for k in judging if constant.place in known[k].used]
     if not using:
         return [Effect(value, 0) for value in constant.changed()]

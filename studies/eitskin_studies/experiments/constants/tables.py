@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from eitskin_studies.experiments.constants.judged import Scene
-from eitskin_studies.experiments.constants.sweep import Effect
+from eitskin_studies.experiments.constants.sweep import IN_TIME, Effect
 from eitskin_studies.experiments.constants.variant import Constant
 from eitskin_studies.experiments.experiment import Table
 
@@ -158,7 +158,7 @@ def words_of(
     facts: Mapping[str, Any],
 ) -> dict[str, str]:
     """Return a text about the run."""
-    whole = [one.name for one in constants if one.module != "fast"]
+    whole = [one.name for one in constants if one.module not in IN_TIME]
     some = next((one.before for name in whole for one in effects[name] if one.before), {})
     return {
         "set": (

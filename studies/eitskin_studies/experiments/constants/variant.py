@@ -25,8 +25,7 @@ from eitskin_emulator.core_on_qemu import need_tools
 NAME = "constants_core"
 FLAGS = "-std=c11 -O2 -fPIC -w -fno-fast-math -ffp-contract=off -fno-math-errno"
 AVX2 = "-mavx2 -mfma -mf16c -DEITS_BUILD_AVX2"
-# sizes of arrays in structures: a variable cannot be one; the module that has them is rebuilt in
-# a later issue
+# sizes of arrays in structures: a variable cannot be one
 SIZES = frozenset(
     {
         "FAST_MAX_TOUCHES",
