@@ -72,7 +72,7 @@ class Tests:
 
     def __init__(self, folder: Path) -> None:
         root, objects = checkout_root(), test_objects()
-        self._folder = folder
+        self._folder = folder = folder.resolve()
         sources = write_sources(folder, root, constants_of(root), _HOOKS)
         compile_sources(folder / LIBRARY, folder, root, sources, ())
         programs = [self._linked(one) for one in objects]
@@ -84,7 +84,7 @@ class Tests:
         """The program of a test's object file and the variant."""
         program = self._folder / test.name.removesuffix(".c.o")
         helpers = test.parents[2] / HELPERS
-        library = [f"-L{self._folder}", f"-l:{LIBRARY}", f"-Wl,-rpath,{self._folder.resolve()}"]
+        library = [f"-L{self._folder}", f"-l:{LIBRARY}", f"-Wl,-rpath,{self._folder}"]
         command = ["cc", str(test), str(helpers), *library, "-lm", "-o", str(program)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
