@@ -2,6 +2,7 @@
 
 import pytest
 
+from eitskin.device.open import open_device
 from eitskin.scene.description import load_scene
 from eitskin_studies.benchmarks import live_view, outputs
 from eitskin_studies.harness.sections import fill_marks
@@ -31,6 +32,13 @@ def test_the_page_has_the_places(tmp_path):
     assert text.count("| 28.0 ms | 46.0 ms |") == 2
     assert "23 of 24 contacts" in text and "120.5 MB at the end" in text
     assert "23 of 24 contacts" in outputs.as_text(result)
+
+
+def test_the_live_pages_scene_is_one_that_a_board_can_scan(tmp_path):
+    path = tmp_path / "moving.toml"
+    path.write_text(live_view.SCENE)
+    with open_device(f"sim:{path}?loop=1") as device:
+        assert device.transport.capabilities.scene.rate_hz == pytest.approx(48.0)
 
 
 @pytest.mark.long("test_the_page_has_the_places, test_a_scene_ends_by_itself; sinks/test_sinks.py")

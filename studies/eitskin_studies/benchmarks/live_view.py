@@ -17,13 +17,12 @@ import numpy as np
 from eitskin_studies.harness.live_page import browser, need_browser, served_page
 from eitskin_studies.harness.sections import Filling, text_table
 
-RATE_HZ = 50.0
 PAGES = (0, 1, 8)
 UNREAD_PORT = 47_808
 WARM_S = 3.0
 SCENE = """[scene]
-frames = 400
-rate_hz = 50.0
+frames = 384
+rate_hz = 48.0
 quiet_frames = 16
 [[touch]]
 radius_mm = 9.0
