@@ -13,10 +13,11 @@ from eitskin_studies.harness.extras import missing_studies_extra
 
 DRIVER = "/usr/bin/chromedriver"
 FLAGS = (
-    "--headless=new --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader"
-    " --disable-quic --no-first-run --disable-background-networking"
+    "--headless=new --no-sandbox --disable-quic --no-first-run --disable-background-networking"
     " --disable-component-update --disable-sync"
 )
+WITH_WEBGL = " --use-angle=swiftshader --enable-unsafe-swiftshader"
+WITHOUT_WEBGL = " --disable-gpu"  # what is drawn in two dimensions is drawn faster so
 
 
 def need_browser() -> None:
@@ -55,14 +56,15 @@ def served_page(url: str, sinks: Sequence[str] = ()) -> Iterator[tuple[subproces
 
 
 @contextmanager
-def browser(address: str, script: str = "") -> Iterator[Any]:
-    """Chromium, looking at ``address``; ``script`` runs before the page's own."""
+def browser(address: str, script: str = "", *, webgl: bool = False) -> Iterator[Any]:
+    """Chromium, looking at ``address``; ``script`` runs before the page's own. Only with ``webgl``
+    skins are shown in three dimensions."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         options = webdriver.ChromeOptions()
-        for flag in FLAGS.split():
+        for flag in (FLAGS + (WITH_WEBGL if webgl else WITHOUT_WEBGL)).split():
             options.add_argument(flag)
         options.add_argument(f"--user-data-dir={folder}")
         driver: Any = webdriver.Chrome(options, Service(DRIVER))

@@ -45,7 +45,7 @@ def draw_live_robot(path: Path) -> None:
     """Write one picture of the page of a robot with three skins. Errors are those of
     ``draw_live_view``."""
     need_browser()
-    with served_page(ROBOT_URL) as (_, address), browser(address) as page:
+    with served_page(ROBOT_URL) as (_, address), browser(address, webgl=True) as page:
         _set_size(page)
         _wait_for(page, ROBOT_TIME_S)
         _write(path, [_shot(page)], 1000)
