@@ -11,6 +11,7 @@ from eitskin.surface.surface_map import SurfaceMap, SurfaceTouch
 from eitskin.view.panels import check_picture, save_picture
 
 ELECTRODE, TOUCH = "#1f5f99", "#c2410c"
+LABEL_POINTS = 9  # from an electrode to its number
 
 
 def draw_surface(path: str | Path, skin: Skin, touches: Sequence[SurfaceTouch] = ()) -> None:
@@ -44,15 +45,20 @@ def _draw_space(
         panel.text(*centre, f" {k}", fontsize=7, color=ELECTRODE)
     length = 0.2 * float(np.ptp(points, axis=0).max())
     turn = np.linspace(0, 2 * np.pi, 40)
-    for one in touches:
+    for number, one in enumerate(touches):
         edge = np.column_stack([np.cos(turn), np.sin(turn)]) @ one.tangents.T
         ring = 1e3 * (one.point_m + one.radius_m * edge) + 0.02 * length * one.normal
-        panel.plot(*ring.T, color=TOUCH, lw=1.5, zorder=5)
+        label = None if number else "touch and the normal of the surface"
+        panel.plot(*ring.T, color=TOUCH, lw=1.5, zorder=5, label=label)
         arrow = 1e3 * one.point_m + np.outer([0.0, length], one.normal)
         panel.plot(*arrow.T, color=TOUCH, lw=1.5, zorder=5)
     panel.set_box_aspect(np.ptp(points, axis=0))
-    panel.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
-    panel.set_title("in the link's frame", fontsize=10, loc="left")
+    panel.set(zlabel="z, mm")
+    panel.set_xlabel("x, mm", labelpad=10)
+    panel.set_ylabel("y, mm", labelpad=14)
+    panel.set_title("the surface in its link's frame, with its electrodes", fontsize=10, loc="left")
+    if touches:
+        panel.legend(loc="upper left", fontsize=8, frameon=False)
 
 
 def _draw_copy(figure: Any, panel: Any, skin: Skin, surface: SurfaceMap) -> None:
@@ -64,8 +70,11 @@ def _draw_copy(figure: Any, panel: Any, skin: Skin, surface: SurfaceMap) -> None
     panel.plot(*rim.T, color="#444", lw=0.8)
     centres = skin.electrode_centres_mm()
     panel.scatter(*centres.T, color=ELECTRODE, s=14, zorder=3)
-    for k, centre in enumerate(centres):
-        panel.annotate(str(k), centre, fontsize=7, color=ELECTRODE, xytext=(3, 3),
-                       textcoords="offset points")  # fmt: skip
-    panel.set(aspect="equal", xlabel="mm", ylabel="mm")
-    panel.set_title("flattened copy", fontsize=10, loc="left")
+    outward = centres - surface.rim_mm.mean(axis=0)
+    outward *= LABEL_POINTS / np.linalg.norm(outward, axis=1, keepdims=True)
+    for k, (centre, offset) in enumerate(zip(centres, outward, strict=True)):
+        panel.annotate(str(k), centre, fontsize=7, color=ELECTRODE, xytext=offset,
+                       textcoords="offset points", ha="center", va="center")  # fmt: skip
+    panel.margins(0.08)
+    panel.set(aspect="equal", xlabel="x of the copy, mm", ylabel="y of the copy, mm")
+    panel.set_title("its flattened copy", fontsize=10, loc="left")

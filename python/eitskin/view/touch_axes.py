@@ -1,8 +1,9 @@
 """Draw a skin with its image and touches on matplotlib axes, for notebooks and your own figures."""
 
 from collections.abc import Sequence
+from functools import partial
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +29,8 @@ def draw_touches(
     ax: "Axes | None" = None,
 ) -> "Axes":
     """Draw the skin of ``model`` with an ``image`` (n,) in S/m, found touches as crosses and
-    ``true`` ones as circles. Return the axes: ``ax``, or those of a new figure.
+    ``true`` ones as circles. Return the axes: ``ax``, or those of a new figure, which a notebook
+    shows as a picture.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -42,7 +44,9 @@ def draw_touches(
         if ax is None:
             figure = matplotlib.figure.Figure(figsize=(INCHES, INCHES), layout="compressed")
             matplotlib.backends.backend_agg.FigureCanvasAgg(figure)
-            ax = figure.add_subplot()
+            made: Any = figure.add_subplot()
+            made._repr_png_ = partial(_png, made)
+            ax = made
         draw_panel(ax, model.skin, model.grid, panel, small=True)
     return ax
 
@@ -55,6 +59,10 @@ def touches_png(
 ) -> bytes:
     """Return the picture of ``draw_touches`` as the bytes of a PNG, for ``_repr_png_``. Raises the
     same errors."""
-    axes, data = draw_touches(model, touches, image, true=true), BytesIO()
+    return _png(draw_touches(model, touches, image, true=true))
+
+
+def _png(axes: "Axes") -> bytes:
+    data = BytesIO()
     axes.figure.figure.savefig(data, format="png", dpi=DPI)
     return data.getvalue()

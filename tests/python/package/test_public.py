@@ -80,6 +80,14 @@ def test_axes_are_taken_and_returned():
     ax = Figure().add_subplot()
     assert draw_touches(eitskin.load_model(), title="skin", ax=ax) is ax
     assert ax.get_title() == "skin" and len(ax.patches) >= 2
+    assert not hasattr(ax, "_repr_png_")  # whoever made the figure shows it
+
+
+def test_axes_of_a_new_figure_are_a_picture_in_a_notebook():
+    from eitskin.view.touch_axes import draw_touches
+
+    axes = draw_touches(eitskin.load_model(), title="skin")
+    assert axes._repr_png_().startswith(b"\x89PNG")
 
 
 def test_without_matplotlib_there_is_no_picture():
