@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 DPI = 90
-COLOURS = 64
+COLOURS = 256
 ELEMENTS = 2000
 FRAMES = 40
 RATE_HZ = 20.0
@@ -179,5 +179,7 @@ def save_small_png(figure: "Figure", path: str | Path) -> None:
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=DPI)
     with Image.open(drawn) as image, write_beside(path) as temporary:
-        palette = image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+        palette = image.convert("RGB").quantize(
+            COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+        )
         palette.save(temporary, format="png", optimize=True)
