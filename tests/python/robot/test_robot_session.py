@@ -229,7 +229,8 @@ def test_a_board_that_goes_comes_back_while_others_go_on(tmp_path):
     for name in ("real", "real-2", "sim"):
         assert main(["replay", str(tmp_path / "run" / f"{name}.eits")]) == 0
     real_skin, sim = load_robot(tmp_path / "run" / "robot.toml").skins
-    assert real_skin.starts_s < 1 and sim.starts_s == 0
+    # by the robot's clock: some seconds at most, on a busy machine, too
+    assert 0 <= real_skin.starts_s < 30 and sim.starts_s == 0
 
 
 def several(folder: Path, scene: str, count: int) -> Path:
