@@ -1,4 +1,5 @@
-"""What a drawing of discs is worth to a method that makes images, without eitskin's fit.
+"""How much the MIoU of another method's images rises if its touches are drawn as discs, without
+eitskin's fit.
 
 The table is in docs/reference/metrics.md, "Discs at the touches of other methods".
 """

@@ -42,7 +42,7 @@ def given(path: Path, setup: Setup, scenes: Scenes) -> dict[str, np.ndarray]:
 
 
 def elsewhere(arrays: dict[str, np.ndarray]) -> np.ndarray:
-    """What another program might do: images (K, n, V) by Tikhonov's method."""
+    """Return images (K, n, V) by Tikhonov's method, as another program might make them."""
     jacobian, made = np.asarray(arrays["J"]), []
     for strength in STRENGTHS:
         weight = strength * np.linalg.norm(jacobian, 2) ** 2 * np.eye(len(jacobian))

@@ -20,7 +20,8 @@ FOLDER = "EITSKIN_MARGINS"  # of a run: workers of pytest-xdist inherit the envi
 FILE = "EITSKIN_MARGINS_FILE"
 MEASURED = ("csrc", "python", "tests/python/hard_cases", ":(exclude)*/front.json",
             ":(exclude)*/margins.json")  # fmt: skip
-"""What margins depend on, as git names it in the root of the checkout; not what was measured."""
+"""The paths on which margins depend, relative to the checkout's root, as git takes them. Files that
+only store measured numbers are excluded."""
 
 
 def share(measured: float, bound: float) -> float:

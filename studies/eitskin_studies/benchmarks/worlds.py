@@ -112,10 +112,12 @@ def run_limits(settings: Settings, progress: Progress = silent) -> ColumnLimits:
         GeometryError, MissingExtraError: from simulating.
     """
     model, blob, _ = load_or_prebuilt(settings.model)
-    factory, how = WorldFactory(model.skin, model.protocol, settings.cache), settings
+    factory = WorldFactory(model.skin, model.protocol, settings.cache)
     drawn = [
-        factory.scenes(name, how.scenes, how.seed, family=how.family, progress=progress)
-        for name in how.sets
+        factory.scenes(
+            name, settings.scenes, settings.seed, family=settings.family, progress=progress
+        )
+        for name in settings.sets
     ]
     rows = []
     for columns in LIMITS:

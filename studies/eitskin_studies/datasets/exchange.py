@@ -104,10 +104,10 @@ class ReturnedImages:
     images: FloatArray
 
     def reconstruct(self, dv: FloatArray) -> FloatArray:
-        """Images (k, n) of difference frames (k, m), each of which the program was given.
+        """Return the program's images (k, n) of difference frames (k, m).
 
         Raises:
-            UsageError: it was not.
+            UsageError: the program was not given one of these frames.
         """
         frames = difference_frames(dv, self.dv.shape[1])
         return np.array([self.images[self._row_of(k, frame)] for k, frame in enumerate(frames)])
