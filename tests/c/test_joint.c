@@ -4,6 +4,7 @@
 
 #include "base/cholesky.h"
 #include "context/places.h"
+#include "diagnostics/diagnostics.h"
 #include "eitskin/solve.h"
 #include "eitskin/touch.h"
 #include "joint/constants.h"
@@ -280,7 +281,7 @@ TEST(shapes_that_are_held_answer_as_before)
     (void)eits_joint_evaluate(ctx, &all, 1);
     const eits_real again = all.cost;
     (void)eits_joint_evaluate(ctx, &all, 6);
-    CHECK_NEAR(again, all.cost, 0.02 * (double)all.cost + 0.02);
+    CHECK_NEAR(again, all.cost, 0.05 * (double)all.cost);
 }
 
 /* A disc that is not there scores nothing; one that is missing scores much, and its strength is
@@ -405,19 +406,20 @@ TEST(discs_stay_within_the_rim)
 /* ---- the metric ---- */
 
 /* a' (diag(variance) + errors + much g g')^-1 c, densely, by Gauss's elimination. */
-static double dense_product(const eits_context *ctx, double variance, double errors,
-                            const eits_real *a, const eits_real *c)
+static double dense_product(const eits_context *ctx, double errors, const eits_real *a,
+                            const eits_real *c)
 {
     double m[SMALL_FOLDED][SMALL_FOLDED + 1], sum = 0, drift = 0;
+    const double much = 1e5 / pow((double)ctx->joint.weight[0], 2);
     for (int i = 0; i < SMALL_FOLDED; ++i)
         drift += pow((double)ctx->projection.gain_drift[i], 2);
     for (int i = 0; i < SMALL_FOLDED; ++i) {
         for (int j = 0; j < SMALL_FOLDED; ++j) {
-            m[i][j] = i == j ? variance : 0;
+            m[i][j] = i == j ? 1 / pow((double)ctx->joint.weight[i], 2) : 0;
             for (uint32_t v = 0; v < ctx->joint.errors; ++v)
                 m[i][j] += errors * (double)vectors[VECTORS * i + (int)v] *
                            (double)vectors[VECTORS * j + (int)v];
-            m[i][j] += 1e5 * variance * (double)ctx->projection.gain_drift[i] *
+            m[i][j] += much * (double)ctx->projection.gain_drift[i] *
                        (double)ctx->projection.gain_drift[j] / drift;
         }
         m[i][SMALL_FOLDED] = (double)c[i];
@@ -434,6 +436,22 @@ static double dense_product(const eits_context *ctx, double variance, double err
     return sum;
 }
 
+/* A fold's variance has its noise, a part of the whole data and a part of its own datum. */
+TEST(weights_fall_with_the_datum_of_a_fold)
+{
+    eits_context *ctx = open_joint(1);
+    stage_shapes(ctx, DISCS, 2, 1);
+    (void)eits_joint_metric(ctx);
+    const double model = (double)EITS_JOINT_MODEL_ERROR, own = (double)EITS_JOINT_OWN_ERROR;
+    for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
+        const double d = (double)ctx->frame.d[k], noise = (double)eits_fold_noise(ctx, k),
+                     common = model * model * (double)ctx->joint.whole / SMALL_FOLDED,
+                     variance = noise + common + own * own * d * d;
+        CHECK(noise > 0);
+        CHECK_NEAR(pow((double)ctx->joint.weight[k], -2) / variance, 1, 1e-4);
+    }
+}
+
 /* The products that the fit makes of weighed columns are those of the inverse covariance; vectors
  * of errors far below the noise are left out, and all of them on a skin that is the model's. */
 TEST(products_are_those_of_the_inverse_covariance)
@@ -446,21 +464,21 @@ TEST(products_are_those_of_the_inverse_covariance)
         const eits_joint_memory *m = &ctx->joint;
         (void)eits_joint_metric(ctx);
         CHECK_EQUAL(m->errors > 0, distances[k] > 0);
-        const double weight = (double)m->weight[0], variance = 1 / (weight * weight);
         eits_real columns[2][SMALL_FOLDED], along[2][EITS_JOINT_NUISANCES] = {{0}};
         const eits_real part = R(0.2);
-        double far = distances[k] / 0.18, energy = 0, of_drift = 0, got = 0;
+        double far = distances[k] / 0.18, square = 0, drift = 0, along_drift = 0, got = 0;
         for (int i = 0; i < SMALL_FOLDED; ++i) {
             columns[0][i] = ctx->frame.d[i];
             columns[1][i] = part * (eits_real)sin(i + 1.0);
-            energy += pow((double)ctx->frame.d[i], 2);
-            of_drift += (double)ctx->frame.d[i] * (double)m->drift[i];
+            square += pow((double)ctx->frame.d[i], 2);
+            drift += pow((double)ctx->projection.gain_drift[i], 2);
+            along_drift += (double)ctx->frame.d[i] * (double)ctx->projection.gain_drift[i];
         }
-        energy -= of_drift * of_drift;
+        const double energy = square - along_drift * along_drift / drift;
         const double errors = (double)EITS_JOINT_ERROR_SHARE * fmin(1, far * far) * energy;
-        const double expected[3] = {dense_product(ctx, variance, errors, columns[0], columns[0]),
-                                    dense_product(ctx, variance, errors, columns[0], columns[1]),
-                                    dense_product(ctx, variance, errors, columns[1], columns[1])};
+        const double expected[3] = {dense_product(ctx, errors, columns[0], columns[0]),
+                                    dense_product(ctx, errors, columns[0], columns[1]),
+                                    dense_product(ctx, errors, columns[1], columns[1])};
         for (int c = 0; c < 2; ++c) {
             for (int i = 0; i < SMALL_FOLDED; ++i)
                 columns[c][i] *= m->weight[i];
@@ -477,7 +495,7 @@ TEST(products_are_those_of_the_inverse_covariance)
                 got -= (double)along[left][i] * (double)along[right][i];
             CHECK_NEAR(got, expected[c], 1e-3 * sqrt(expected[0] * expected[2]) + 1e-3);
         }
-        CHECK_NEAR(eits_joint_data(ctx), energy / variance, 1e-3 * energy / variance);
+        CHECK_NEAR(m->whole, energy, 1e-3 * energy);
     }
 }
 

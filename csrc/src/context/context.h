@@ -240,6 +240,7 @@ typedef struct eits_joint_memory {
     uint32_t errors;     /* vectors of the model's errors in use */
     eits_real error_unit;
     eits_real energy; /* |W d|^2 minus its part along the drift: the misfit without touches */
+    eits_real whole;  /* |d|^2 of the folds in use minus its part along the drift */
     eits_real *normal, *factor, *kept; /* EITS_JOINT_TRIANGLE each, packed by rows */
     uint64_t evaluated;                /* multiply-accumulates of the last evaluation with slopes */
     eits_real gradient[EITS_JOINT_PARAMETERS];

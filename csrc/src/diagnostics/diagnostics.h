@@ -88,8 +88,12 @@ int eits_check_drift(eits_context *ctx);
 /* Set UNLIKE_MODEL if the reference is further from the model's than that of an uneven skin. */
 void eits_check_unlike_model(eits_context *ctx);
 
-/* Return the variance that the learned noise gives to a fold's datum, summed over the folds in use.
- * A fold with copied reciprocals counts as one measurement. */
+/* Return the variance that the learned noise gives to fold k: that of its row, or half of it if two
+ * rows were averaged. A pair that agrees to the last bit was copied and not measured twice, so it
+ * has the variance of one row. 0 for a fold that is left out. */
+eits_real eits_fold_noise(const eits_context *ctx, uint32_t k);
+
+/* Return their sum: the |d|^2 that noise alone would give. */
 eits_real eits_noise_energy(const eits_context *ctx);
 
 /* Return the part of |y|^2 that this noise causes. */

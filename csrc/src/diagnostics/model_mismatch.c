@@ -52,26 +52,27 @@ static uint64_t learn_off_range(eits_context *ctx, const eits_scratch *scratch)
     return 2u * (uint64_t)folds * rank;
 }
 
-/* Return the |d|^2 that noise alone would give. The variance of a fold is that of its row, or half
- * of it if two rows were averaged. A pair that agrees to the last bit was copied and not measured
- * twice, so it has the variance of one row. */
-eits_real eits_noise_energy(const eits_context *ctx)
+eits_real eits_fold_noise(const eits_context *ctx, uint32_t k)
 {
     const eits_reference *b = &ctx->reference;
+    const uint32_t i = ctx->frame.sides[k] == EITS_SIDE_SECOND ? ctx->model->fold[k].second
+                                                               : ctx->model->fold[k].first;
+    if (ctx->frame.sides[k] == EITS_SIDE_NONE) /* it may have no reference at all */
+        return 0;
+    const eits_real noise = ctx->model->data_kind == EITS_DATA_NORMALISED
+                                ? b->noise_v / b->v0[i]
+                                : b->gain * b->noise_v * b->row_gain[i],
+                    each = noise * noise;
+    return ctx->frame.sides[k] == EITS_SIDE_BOTH && ctx->frame.reciprocity_error[k] != 0
+               ? R(0.5) * each
+               : each;
+}
+
+eits_real eits_noise_energy(const eits_context *ctx)
+{
     eits_real sum = 0;
-    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        if (ctx->frame.sides[k] == EITS_SIDE_NONE) /* it may have no reference at all */
-            continue;
-        const uint32_t i = ctx->frame.sides[k] == EITS_SIDE_SECOND ? ctx->model->fold[k].second
-                                                                   : ctx->model->fold[k].first;
-        const eits_real noise = ctx->model->data_kind == EITS_DATA_NORMALISED
-                                    ? b->noise_v / b->v0[i]
-                                    : b->gain * b->noise_v * b->row_gain[i];
-        const eits_real each = noise * noise;
-        sum += ctx->frame.sides[k] == EITS_SIDE_BOTH && ctx->frame.reciprocity_error[k] != 0
-                   ? R(0.5) * each
-                   : each;
-    }
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k)
+        sum += eits_fold_noise(ctx, k);
     return sum;
 }
 

@@ -132,7 +132,7 @@ static int same_touches(const eits_context *ctx, const eits_fit *f, const eits_j
 static int was_better(const eits_context *ctx, const eits_joint *first, const eits_joint *j)
 {
     return !eits_joint_explains(ctx, j) && first->count > 0 && eits_joint_explains(ctx, first) &&
-           eits_joint_left(ctx, first) < EITS_JOINT_SURE * eits_joint_data(ctx);
+           eits_joint_left(ctx, first) < EITS_JOINT_SURE * ctx->joint.energy;
 }
 
 void eits_fit_jointly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j)

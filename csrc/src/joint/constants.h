@@ -45,10 +45,15 @@
  * discs */
 #define EITS_JOINT_SHAPE_SPREAD R(0.15)
 
-/* the multipole model's own error on a fold: with it eight touches at 80 dB have a median error of
- * .110 mm, with half of it .134, with a sixth .157 (exact frames, seed 6) [of the data's rms].
+/* the part of the multipole model's own error on a fold that all folds have [of the data's rms].
  * larger: information in the data is ignored; smaller: the model's error is fitted */
-#define EITS_JOINT_MODEL_ERROR R(0.006)
+#define EITS_JOINT_MODEL_ERROR R(0.002)
+
+/* the part that grows with what touches change in the fold. Eight touches at 80 dB (tuning 3) have
+ * a median error of .127 mm with JOINT_MODEL_ERROR .006 alone, .083 with .002 and this .006, .079
+ * with .0015 and .01, .075 with .003 and .01, where fewer pairs are counted as two [of the fold's
+ * datum]. as JOINT_MODEL_ERROR */
+#define EITS_JOINT_OWN_ERROR R(0.006)
 
 /* fraction of the model's errors in the metric if the reference is as far from the model as the
  * random skins of [uncertainty] are. larger: uneven skins are trusted too little; smaller: too

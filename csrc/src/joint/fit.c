@@ -23,7 +23,7 @@ enum { BLOCK = EITS_JOINT_BLOCK, MAX_PARAMETERS = EITS_JOINT_PARAMETERS };
 static const eits_poles DISCS = {.orders = 3, .sent = 2}, ELLIPSES = {.orders = 5, .sent = 3};
 
 /* Discs need fewer orders; where a single shape is none, all have those of ellipses. */
-static const eits_poles *poles_of(const eits_joint *j)
+const eits_poles *eits_joint_poles(const eits_joint *j)
 {
     int round = j->parameters == EITS_JOINT_DISC;
     for (uint32_t k = 0; k < j->count; ++k)
@@ -86,7 +86,7 @@ static uint64_t add_block(eits_context *ctx, const eits_joint *j, int slopes, ui
         eits_pole_out out = {.value = value};
         for (uint32_t p = 0; slopes && p < j->parameters; ++p)
             out.slope[p] = m->column + (size_t)BLOCK * (free * j->parameters + p);
-        macs += eits_pole_rows(ctx, k, &j->shape[k], poles_of(j), first, count, &out);
+        macs += eits_pole_rows(ctx, k, &j->shape[k], eits_joint_poles(j), first, count, &out);
         for (uint32_t i = 0; slopes && i < count; ++i) /* of log |q| */
             out.slope[3][i] *= j->shape[k].amplitude;
         for (uint32_t i = 0; i < count; ++i)
@@ -129,7 +129,7 @@ uint64_t eits_joint_hold(eits_context *ctx, const eits_joint *j, uint32_t rounds
             const eits_pole_out out = {.value = value};
             if (is_free(j, k))
                 continue;
-            macs += eits_pole_rows(ctx, k, &j->shape[k], poles_of(j), first, count, &out);
+            macs += eits_pole_rows(ctx, k, &j->shape[k], eits_joint_poles(j), first, count, &out);
             for (uint32_t i = 0; i < count; ++i)
                 rest[first + i] -= value[i];
         }
@@ -192,8 +192,8 @@ static uint64_t evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds, int 
     uint64_t macs = 0;
     for (uint32_t k = 0; k < j->free_count && rounds > 0; ++k)
         macs += bring_home(ctx, j->free[k], &j->shape[j->free[k]]);
-    macs +=
-        eits_pole_induced_in(ctx, j->shape, j->count, j->free, j->free_count, poles_of(j), rounds);
+    macs += eits_pole_induced_in(ctx, j->shape, j->count, j->free, j->free_count,
+                                 eits_joint_poles(j), rounds);
     eits_zero(m->normal, EITS_LOWER_SIZE(n));
     eits_zero(m->gradient, n);
     for (uint32_t a = 0; a < n; ++a)
@@ -202,7 +202,6 @@ static uint64_t evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds, int 
         const uint32_t count = folds - first < BLOCK ? folds - first : BLOCK;
         macs += add_block(ctx, j, slopes, further, first, count, &s);
     }
-    j->left = eits_fma(-s.along[0], s.along[0], s.square);
     eits_joint_finish_along(ctx, s.along);
     j->misfit = s.square - product(ctx, s.along, s.along);
     j->cost = j->misfit + eits_joint_priors(ctx, j);

@@ -4,9 +4,9 @@
  *     F = sum over folds ((d - answers) / sigma)^2 - (its part along the drift of the gain)
  *         + sum over touches of h(log |q|) + (log(r / R) / dR)^2 + (e_1^2 + e_2^2) / dE^2
  *
- * is minimised by damped Gauss-Newton steps (fit.c). sigma^2 is the variance of a fold's noise plus
- * that of the multipole model's own error, which is a fraction of the data (metric.c). h is the
- * lesser of two costs: that of a light touch and that of a strong one (prior.c).
+ * is minimised by damped Gauss-Newton steps (fit.c). sigma^2, of each fold, is the variance of its
+ * noise plus that of the multipole model's own error, which is a fraction of the data (metric.c). h
+ * is the lesser of two costs: that of a light touch and that of a strong one (prior.c).
  * docs/design/joint-fit.md has the formulas and their sources. */
 #ifndef EITSKIN_JOINT_H
 #define EITSKIN_JOINT_H
@@ -31,7 +31,6 @@ typedef struct eits_joint {
     uint32_t parameters; /* of each: EITS_JOINT_DISC or EITS_JOINT_ELLIPSE */
     eits_real cost;      /* F */
     eits_real misfit;    /* the data's part of F: its first line above */
-    eits_real left;      /* the same without the model's errors in the metric */
 } eits_joint;
 
 /* metric.c */
@@ -43,9 +42,6 @@ uint64_t eits_joint_metric(eits_context *ctx);
 
 /* The number of folds in use. */
 uint32_t eits_joint_folds(const eits_context *ctx);
-
-/* |W d|^2 less its part along the drift. */
-eits_real eits_joint_data(const eits_context *ctx);
 
 /* Add the products of n weighted columns with the drift and the model's errors, 1 + joint.errors
  * products per column. `columns` has the folds first ... first + count - 1 of each column, one
@@ -63,6 +59,9 @@ void eits_joint_finish_along(eits_context *ctx, eits_real *along);
 /* Compute F of the shapes as they are, and the normal equations about them, after `rounds` more
  * rounds of the fields that touches send to each other. Returns the multiply-accumulates. */
 uint64_t eits_joint_evaluate(eits_context *ctx, eits_joint *j, uint32_t rounds);
+
+/* Return how many orders the answers of the shapes have. */
+const eits_poles *eits_joint_poles(const eits_joint *j);
 
 /* Take steps until F hardly falls, falls as the linearisation predicted, or would stay above
  * `hopeless`. There are at most EITS_JOINT_STEPS steps, and none begins once `macs` exceeds j->most

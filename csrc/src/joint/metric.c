@@ -1,6 +1,7 @@
 /* The metric of the joint fit, and what no touch causes.
  *
- * Folds have independent noise of one variance. Beside it, the data may have any amount of the
+ * Folds have independent errors, each of a variance of its own: noise, and what the multipole model
+ * itself errs by, which grows with the fold's datum. Beside it, the data may have any amount of the
  * drift of the gain, and the model's errors: the second
  * moment s |d|^2 sum e e' (section ROWE), where s grows with the square of the distance of the
  * reference from the model. With W the weights, B the columns W e s^1/2 |d| and g the direction of
@@ -39,7 +40,8 @@ eits_real eits_joint_excess(const eits_context *ctx, const eits_joint *j)
     return eits_larger(j->misfit / eits_joint_freedom(ctx, j), 1);
 }
 
-eits_real eits_joint_data(const eits_context *ctx)
+/* |W d|^2 less its part along the drift. */
+static eits_real data_energy(const eits_context *ctx)
 {
     const eits_joint_memory *m = &ctx->joint;
     eits_real square = 0, along = 0;
@@ -51,13 +53,12 @@ eits_real eits_joint_data(const eits_context *ctx)
     return eits_fma(-along, along, square);
 }
 
-/* Weights of 0 and 1, and the drift's direction over these folds. */
-static void take_folds(eits_context *ctx)
+/* The direction of the gain's drift in the metric of the weights. */
+static void aim_drift(eits_context *ctx)
 {
     eits_joint_memory *m = &ctx->joint;
     eits_real square = 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
-        m->weight[k] = ctx->frame.sides[k] == EITS_SIDE_NONE ? 0 : 1;
         m->drift[k] = m->weight[k] * ctx->projection.gain_drift[k];
         square = eits_fma(m->drift[k], m->drift[k], square);
     }
@@ -66,15 +67,21 @@ static void take_folds(eits_context *ctx)
         m->drift[k] *= norm;
 }
 
-/* The variance of a fold: the noise's mean over the folds in use, and what the multipole model
- * itself errs by. */
-static eits_real fold_variance(const eits_context *ctx, eits_real energy)
+/* The weights 1 / sigma of the folds in use. A fold's variance is that of its noise, and the
+ * squared errors of the multipole model: a share of what touches change in this fold, and a share
+ * of what they change in the mean. `energy` is that of the data. */
+static void weigh_folds(eits_context *ctx, eits_real energy)
 {
+    eits_joint_memory *m = &ctx->joint;
     const eits_real least = EITS_JOINT_MIN_NOISE * ctx->reference.gain * ctx->reference.v0_rms,
-                    folds = (eits_real)eits_joint_folds(ctx), used = eits_larger(folds, 1),
-                    noise = eits_noise_energy(ctx) / used;
-    return eits_larger(noise, least * least) +
-           EITS_JOINT_MODEL_ERROR * EITS_JOINT_MODEL_ERROR * energy / used;
+                    folds = (eits_real)eits_joint_folds(ctx),
+                    common = EITS_JOINT_MODEL_ERROR * EITS_JOINT_MODEL_ERROR * energy /
+                             eits_larger(folds, 1);
+    for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
+        const eits_real own = EITS_JOINT_OWN_ERROR * ctx->frame.d[k],
+                        noise = eits_larger(eits_fold_noise(ctx, k), least * least);
+        m->weight[k] /= eits_sqrt(eits_fma(own, own, noise + common));
+    }
 }
 
 /* s |d|^2 */
@@ -85,7 +92,7 @@ static eits_real error_energy(const eits_context *ctx, eits_real energy)
 }
 
 /* Vectors are stored strongest first; the rest would be far below the noise. */
-static uint32_t errors_above_noise(const eits_context *ctx, eits_real errors, eits_real noise)
+static uint32_t errors_above_noise(const eits_context *ctx, eits_real errors)
 {
     const eits_row_errors *e = &ctx->model->row_errors;
     eits_real size[EITS_MAX_PLACE_ROWS] = {0};
@@ -94,11 +101,12 @@ static uint32_t errors_above_noise(const eits_context *ctx, eits_real errors, ei
         return 0;
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k) {
         for (uint32_t i = 0; i < e->count; ++i) {
-            const eits_real v = (eits_real)e->vectors[(size_t)e->count * k + i];
+            const eits_real v =
+                ctx->joint.weight[k] * (eits_real)e->vectors[(size_t)e->count * k + i];
             size[i] = eits_fma(v, v, size[i]);
         }
     }
-    while (count < e->count && errors * size[count] > EITS_JOINT_ERROR_MIN * noise)
+    while (count < e->count && errors * size[count] > EITS_JOINT_ERROR_MIN)
         ++count;
     return count;
 }
@@ -164,7 +172,7 @@ static uint64_t factor_nuisances(eits_context *ctx)
     eits_zero(m->nuisance, EITS_LOWER_SIZE(n));
     for (uint32_t k = 0; k < folds && n > 1; ++k) {
         const float *vector = e->vectors + (size_t)e->count * k;
-        const eits_real on = m->weight[k] > 0 ? m->error_unit : 0;
+        const eits_real on = m->weight[k] * m->error_unit;
         for (uint32_t i = 1; i < n; ++i) {
             eits_real *row = eits_lower_row(m->nuisance, i);
             const eits_real v = on * (eits_real)vector[i - 1u];
@@ -186,30 +194,44 @@ static uint64_t factor_nuisances(eits_context *ctx)
 uint64_t eits_joint_metric(eits_context *ctx)
 {
     eits_joint_memory *m = &ctx->joint;
-    take_folds(ctx);
-    const eits_real energy = eits_joint_data(ctx), variance = fold_variance(ctx, energy),
-                    errors = error_energy(ctx, energy), unit = 1 / eits_sqrt(variance);
     for (uint32_t k = 0; k < ctx->model->n_folded; ++k)
-        m->weight[k] *= unit;
-    m->errors = errors_above_noise(ctx, errors, variance);
-    m->energy = unit * unit * energy;
-    m->error_unit = unit * eits_sqrt(errors);
+        m->weight[k] = ctx->frame.sides[k] == EITS_SIDE_NONE ? 0 : 1;
+    aim_drift(ctx);
+    m->whole = data_energy(ctx);
+    weigh_folds(ctx, m->whole);
+    aim_drift(ctx);
+    m->energy = data_energy(ctx);
+    const eits_real errors = error_energy(ctx, m->whole);
+    m->errors = errors_above_noise(ctx, errors);
+    m->error_unit = eits_sqrt(errors);
     return factor_nuisances(ctx);
+}
+
+/* Weigh a weighted column once more, as the vectors of the errors are. */
+static void weigh_again(const eits_context *ctx, const eits_real *column, uint32_t first,
+                        uint32_t count, eits_real *out)
+{
+    for (uint32_t k = 0; k < count; ++k)
+        out[k] = column[k] * ctx->joint.weight[first + k];
 }
 
 void eits_joint_add_along(const eits_context *ctx, const eits_real *columns, uint32_t n,
                           uint32_t first, uint32_t count, eits_real *along)
 {
-    eits_real unused[EITS_JOINT_NUISANCES] = {0};
+    eits_real unused[EITS_JOINT_NUISANCES] = {0}, weighed[2][EITS_JOINT_BLOCK];
     for (uint32_t c = 0; c < n; c += 2u) {
-        const eits_real *column = columns + (size_t)EITS_JOINT_BLOCK * c;
-        eits_real *out = along + (size_t)EITS_JOINT_NUISANCES * c;
         const int alone = c + 1u == n;
-        const eits_real *const pair[2] = {column, alone ? column : column + EITS_JOINT_BLOCK};
-        eits_real *const pair_out[2] = {out, alone ? unused : out + EITS_JOINT_NUISANCES},
-                         *const errors[2] = {pair_out[0] + 1, pair_out[1] + 1};
-        for (int l = 0; l < 2; ++l)
-            pair_out[l][0] += eits_dot(ctx->kernels, pair[l], ctx->joint.drift + first, count);
+        eits_real *const out[2] = {along + (size_t)EITS_JOINT_NUISANCES * c,
+                                   alone ? unused
+                                         : along + (size_t)EITS_JOINT_NUISANCES * (c + 1u)},
+                         *const errors[2] = {out[0] + 1, out[1] + 1};
+        const eits_real *const pair[2] = {weighed[0], weighed[1]};
+        for (uint32_t l = 0; l < 2; ++l) {
+            const eits_real *column = columns + (size_t)EITS_JOINT_BLOCK * (alone ? c : c + l);
+            out[l][0] += eits_dot(ctx->kernels, column, ctx->joint.drift + first, count);
+            if (ctx->joint.errors > 0)
+                weigh_again(ctx, column, first, count, weighed[l]);
+        }
         along_errors(ctx, pair, first, count, errors);
     }
 }

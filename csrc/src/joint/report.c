@@ -1,6 +1,7 @@
 /* From the joint fit's shapes to the frame's touches, and whether they need a test. */
 #include "joint/joint.h"
 
+#include "base/cholesky.h"
 #include "base/vec.h"
 #include "context/places.h"
 #include "joint/constants.h"
@@ -76,20 +77,77 @@ static void report_spread(const eits_context *ctx, const eits_shape *s,
                         : 0;
 }
 
+/* The square of a vector over the folds in use, and its product with the drift of the gain. */
+typedef struct plain {
+    eits_real square, along;
+} plain;
+
+static void add_plain(const eits_context *ctx, const eits_real *v, uint32_t first, uint32_t count,
+                      plain *s)
+{
+    for (uint32_t i = 0; i < count; ++i) {
+        const eits_real on = ctx->joint.weight[first + i] > 0 ? v[i] : 0;
+        s->square = eits_fma(on, on, s->square);
+        s->along = eits_fma(on, ctx->projection.gain_drift[first + i], s->along);
+    }
+}
+
+/* The square less its part along the drift, as a fraction of the data's. */
+static eits_real share_of(const eits_context *ctx, plain s, eits_real drift)
+{
+    const eits_real left = drift > 0 ? s.square - s.along * s.along / drift : s.square;
+    return ctx->joint.whole > 0 && left > 0 ? left / ctx->joint.whole : 0;
+}
+
+/* The rise of F without shape k, over what it would be if the others did not adapt. */
+static eits_real apart(const eits_context *ctx, const eits_joint *j, uint32_t k, eits_real rise)
+{
+    const uint32_t amplitude = EITS_JOINT_DISC - 1, at = k * j->parameters + amplitude;
+    const eits_real alone =
+        eits_lower_row(ctx->joint.normal, at)[at] - eits_joint_precision(&j->shape[k], amplitude);
+    return alone > 0 ? rise / alone : 0;
+}
+
+/* Note the shares of the data's energy that the shapes leave and that each one explains. Here all
+ * folds count alike. */
+static void report_shares(eits_context *ctx, const eits_joint *j, const eits_joint_known *known,
+                          eits_fit *f)
+{
+    eits_real value[EITS_JOINT_BLOCK], left[EITS_JOINT_BLOCK];
+    const uint32_t folds = ctx->model->n_folded;
+    plain own[EITS_MAX_TOUCHES] = {{0, 0}}, rest = {0, 0}, drift = {0, 0};
+    for (uint32_t first = 0; first < folds; first += EITS_JOINT_BLOCK) {
+        const uint32_t some = folds - first,
+                       count = some < EITS_JOINT_BLOCK ? some : EITS_JOINT_BLOCK;
+        const eits_pole_out out = {.value = value};
+        eits_copy(left, ctx->frame.d + first, count);
+        for (uint32_t k = 0; k < j->count; ++k) {
+            f->macs +=
+                eits_pole_rows(ctx, k, &j->shape[k], eits_joint_poles(j), first, count, &out);
+            add_plain(ctx, value, first, count, &own[k]);
+            eits_axpy(ctx->kernels, left, -1, value, count);
+        }
+        add_plain(ctx, left, first, count, &rest);
+        add_plain(ctx, ctx->projection.gain_drift + first, first, count, &drift);
+    }
+    ctx->info.unexplained = share_of(ctx, rest, drift.square);
+    for (uint32_t k = 0; k < j->count; ++k)
+        f->explained[k] = apart(ctx, j, k, known[k].rise) * share_of(ctx, own[k], drift.square);
+}
+
 static void report(eits_context *ctx, const eits_joint *j, const eits_joint_known *known,
                    eits_fit *f)
 {
     const eits_model *model = ctx->model;
     const eits_real pixel = (eits_real)model->pixel_mm, sheet = eits_pole_sheet(model),
-                    excess = eits_joint_excess(ctx, j), whole = eits_joint_data(ctx);
-    ctx->info.unexplained = whole > 0 && j->left > 0 ? j->left / whole : 0;
+                    excess = eits_joint_excess(ctx, j), whole = ctx->joint.energy;
     f->beyond_noise = whole > 0 ? eits_joint_left(ctx, j) / whole : 0;
     f->count = j->count;
     f->joint = 1;
+    report_shares(ctx, j, known, f);
     for (uint32_t k = 0; k < j->count; ++k) {
         const eits_shape *s = &j->shape[k];
         eits_disc *d = &f->disc[k];
-        f->explained[k] = whole > 0 ? known[k].rise / whole : 0;
         d->polarity = s->amplitude < 0 ? R(-1) : R(1);
         d->x_mm = eits_fma(s->x, pixel, (eits_real)model->origin_x_mm);
         d->y_mm = eits_fma(s->y, pixel, (eits_real)model->origin_y_mm);
@@ -104,7 +162,7 @@ static void report(eits_context *ctx, const eits_joint *j, const eits_joint_know
 
 int eits_joint_explains(const eits_context *ctx, const eits_joint *j)
 {
-    return all_finite(j) && eits_joint_left(ctx, j) < EITS_JOINT_MAX_LEFT * eits_joint_data(ctx);
+    return all_finite(j) && eits_joint_left(ctx, j) < EITS_JOINT_MAX_LEFT * ctx->joint.energy;
 }
 
 /* Whether any two shapes may be one: they are near, were not found better than one (split.c), and
