@@ -141,11 +141,14 @@
 
 /* two are fitted if the linearised F falls by more [of what it has to fall by]. larger: pairs count
  * as one; smaller: more work */
-#define EITS_JOINT_SPLIT_HOPE R(0.7)
+#define EITS_JOINT_SPLIT_HOPE R(0.5)
 
 /* the most touches of a frame that are tried as two. larger: more work; smaller: pairs beside other
  * touches count as one */
 #define EITS_JOINT_SPLIT_TRIES 2
+
+/* the same for ellipses, in which discs have already left more than noise. as JOINT_SPLIT_MISFIT */
+#define EITS_JOINT_SPLIT_ELLIPSE R(5.0)
 
 /* nothing is tried as two if the misfit exceeds its expectation by less. With 8, two resting
  * fingers take six times the work in every second frame; up to 22 the counts on tuning 3 are the
@@ -156,6 +159,10 @@
 /* F must fall by this much if one touch becomes two. larger: pairs count as one; smaller: long
  * fingers become two */
 #define EITS_JOINT_SPLIT_FALL R(25.0)
+
+/* the same if the one touch is an ellipse. larger: pairs count as one; smaller: fingers become two.
+ * With 12 for discs, too, noise made two of a resting finger in a frame of 39 */
+#define EITS_JOINT_SPLIT_SHAPED R(12.0)
 
 /* times this on a skin that differs from the model, whose errors look like a second touch. as
  * JOINT_SPLIT_FALL */

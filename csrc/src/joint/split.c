@@ -106,10 +106,13 @@ static int is_large(const eits_context *ctx, const eits_shape *s)
     return eits_joint_is_light(s) && eits_joint_offset(ctx, s, 2) > EITS_JOINT_LIGHT_LARGE;
 }
 
-/* Return the least fall of F where a shape becomes two. */
-static eits_real needed_fall(const eits_context *ctx, const eits_shape *one)
+/* Return the least fall of F where shape k becomes two. Of noise two ellipses explain more beside a
+ * disc than beside an ellipse, which has two numbers more. */
+static eits_real needed_fall(const eits_context *ctx, const eits_joint *j, uint32_t k)
 {
-    const eits_real fall = is_large(ctx, one) ? EITS_JOINT_SPLIT_LARGE : EITS_JOINT_SPLIT_FALL;
+    const eits_real fall = is_large(ctx, &j->shape[k])           ? EITS_JOINT_SPLIT_LARGE
+                           : j->parameters == EITS_JOINT_ELLIPSE ? EITS_JOINT_SPLIT_SHAPED
+                                                                 : EITS_JOINT_SPLIT_FALL;
     return eits_weighs_errors(ctx) ? EITS_JOINT_SPLIT_FAR * fall : fall;
 }
 
@@ -120,7 +123,7 @@ static int stand(const eits_context *ctx, const eits_joint *one, const eits_join
     const eits_real excess = eits_joint_excess(ctx, two);
     const int explains =
         excess < EITS_JOINT_FITTED || excess < EITS_JOINT_SPLIT_MOST * eits_joint_excess(ctx, one);
-    return explains && one->cost - two->cost > needed_fall(ctx, &one->shape[k]) * excess &&
+    return explains && one->cost - two->cost > needed_fall(ctx, one, k) * excess &&
            eits_joint_are_two(&two->shape[k], &two->shape[one->count]);
 }
 
@@ -130,7 +133,7 @@ static int best_two(eits_context *ctx, const eits_joint *one, uint32_t k, eits_j
                     uint64_t *spent)
 {
     const eits_real fits = eits_joint_freedom(ctx, one);
-    eits_real least = one->cost - EITS_JOINT_SPLIT_HOPE * needed_fall(ctx, &one->shape[k]);
+    eits_real least = one->cost - EITS_JOINT_SPLIT_HOPE * needed_fall(ctx, one, k);
     const int is_long = eits_pole_eta(&one->shape[k]) > EITS_JOINT_SPLIT_ETA,
               far = eits_weighs_errors(ctx) != 0;
     int found = 0;
@@ -174,8 +177,9 @@ static int try_two(eits_context *ctx, eits_joint *j, uint32_t k, uint64_t *spent
  * noise does. */
 static int is_doubtful(const eits_context *ctx, const eits_joint *j, uint32_t k)
 {
-    return j->misfit > eits_joint_freedom(ctx, j) + EITS_JOINT_SPLIT_MISFIT ||
-           is_large(ctx, &j->shape[k]);
+    const eits_real more =
+        j->parameters == EITS_JOINT_ELLIPSE ? EITS_JOINT_SPLIT_ELLIPSE : EITS_JOINT_SPLIT_MISFIT;
+    return j->misfit > eits_joint_freedom(ctx, j) + more || is_large(ctx, &j->shape[k]);
 }
 
 /* Whether one more shape may be tried. A crowd of discs is searched instead (search.c). */
