@@ -1,7 +1,6 @@
 /* From the joint fit's shapes to the frame's touches, and whether they need a test. */
 #include "joint/joint.h"
 
-#include "base/cholesky.h"
 #include "base/vec.h"
 #include "context/places.h"
 #include "joint/constants.h"
@@ -77,9 +76,10 @@ static void report_spread(const eits_context *ctx, const eits_shape *s,
                         : 0;
 }
 
-/* The square of a vector over the folds in use, and its product with the drift of the gain. */
+/* The square of a vector over the folds in use, plain and weighed, and its product with the drift
+ * of the gain. */
 typedef struct plain {
-    eits_real square, along;
+    eits_real square, weighed, along;
 } plain;
 
 static void add_plain(const eits_context *ctx, const eits_real *v, uint32_t first, uint32_t count,
@@ -87,7 +87,9 @@ static void add_plain(const eits_context *ctx, const eits_real *v, uint32_t firs
 {
     for (uint32_t i = 0; i < count; ++i) {
         const eits_real on = ctx->joint.weight[first + i] > 0 ? v[i] : 0;
+        const eits_real of = on * ctx->joint.weight[first + i];
         s->square = eits_fma(on, on, s->square);
+        s->weighed = eits_fma(of, of, s->weighed);
         s->along = eits_fma(on, ctx->projection.gain_drift[first + i], s->along);
     }
 }
@@ -99,23 +101,15 @@ static eits_real share_of(const eits_context *ctx, plain s, eits_real drift)
     return ctx->joint.whole > 0 && left > 0 ? left / ctx->joint.whole : 0;
 }
 
-/* The rise of F without shape k, over what it would be if the others did not adapt. */
-static eits_real apart(const eits_context *ctx, const eits_joint *j, uint32_t k, eits_real rise)
-{
-    const uint32_t amplitude = EITS_JOINT_DISC - 1, at = k * j->parameters + amplitude;
-    const eits_real alone =
-        eits_lower_row(ctx->joint.normal, at)[at] - eits_joint_precision(&j->shape[k], amplitude);
-    return alone > 0 ? rise / alone : 0;
-}
-
 /* Note the shares of the data's energy that the shapes leave and that each one explains. Here all
- * folds count alike. */
+ * folds count alike: the rise of F without a touch is multiplied by the mean variance of the folds
+ * that it changes. */
 static void report_shares(eits_context *ctx, const eits_joint *j, const eits_joint_known *known,
                           eits_fit *f)
 {
     eits_real value[EITS_JOINT_BLOCK], left[EITS_JOINT_BLOCK];
     const uint32_t folds = ctx->model->n_folded;
-    plain own[EITS_MAX_TOUCHES] = {{0, 0}}, rest = {0, 0}, drift = {0, 0};
+    plain own[EITS_MAX_TOUCHES] = {{0, 0, 0}}, rest = {0, 0, 0}, drift = {0, 0, 0};
     for (uint32_t first = 0; first < folds; first += EITS_JOINT_BLOCK) {
         const uint32_t some = folds - first,
                        count = some < EITS_JOINT_BLOCK ? some : EITS_JOINT_BLOCK;
@@ -132,7 +126,9 @@ static void report_shares(eits_context *ctx, const eits_joint *j, const eits_joi
     }
     ctx->info.unexplained = share_of(ctx, rest, drift.square);
     for (uint32_t k = 0; k < j->count; ++k)
-        f->explained[k] = apart(ctx, j, k, known[k].rise) * share_of(ctx, own[k], drift.square);
+        f->explained[k] = ctx->joint.whole > 0 && own[k].weighed > 0
+                              ? known[k].rise * (own[k].square / own[k].weighed) / ctx->joint.whole
+                              : 0;
 }
 
 static void report(eits_context *ctx, const eits_joint *j, const eits_joint_known *known,
