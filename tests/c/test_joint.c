@@ -385,6 +385,31 @@ TEST(a_disc_that_is_not_needed_goes_though_all_leave_no_more_than_noise)
     check_the_two(&j, 0.3);
 }
 
+/* One disc stands between the last two of DISCS, with the strength of both. */
+TEST(one_of_few_discs_between_two_touches_becomes_both)
+{
+    eits_context *ctx = open_joint(1);
+    uint64_t macs = 0;
+    stage_shapes(ctx, DISCS, 3, 1);
+    eits_joint j = shapes_of(ctx, DISCS, 2);
+    j.searches = 1;
+    j.shape[1].x = (DISCS[1].x + DISCS[2].x) / 2;
+    j.shape[1].y = (DISCS[1].y + DISCS[2].y) / 2;
+    j.shape[1].radius *= R(1.4);
+    eits_joint_set_apart(ctx, &j, &macs);
+    CHECK(macs > 0);
+    CHECK_EQUAL(j.count, 3);
+    for (uint32_t k = 0; k < 3; ++k) {
+        double least = 99;
+        for (uint32_t i = 0; i < 3; ++i) {
+            const double away =
+                hypot((double)(j.shape[k].x - DISCS[i].x), (double)(j.shape[k].y - DISCS[i].y));
+            least = away < least ? away : least;
+        }
+        CHECK(least < 0.2);
+    }
+}
+
 /* A disc that reaches beyond the rim becomes as small as it has to be. */
 TEST(discs_stay_within_the_rim)
 {

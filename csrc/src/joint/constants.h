@@ -215,6 +215,11 @@
  * takes over the answers of others */
 #define EITS_JOINT_ADD_MOST R(2.0)
 
+/* among few touches one is tried as two at this distance on either side of it. Where one disc
+ * covers two fingers that are 24 to 45 mm apart, the trial that begins with the least F ends at
+ * these two [of the expected radius]. any other value needs more steps */
+#define EITS_JOINT_FAR_APART R(1.8)
+
 /* during a search a disc is removed if F rises by less without it. larger: small touches are
  * removed; smaller: the solver's ripple stays */
 #define EITS_JOINT_NEEDED R(20.0)

@@ -187,6 +187,14 @@ void eits_joint_search(eits_context *ctx, const eits_scratch *scratch, eits_join
  * are those about *j. */
 void eits_joint_split(eits_context *ctx, eits_joint *j, uint64_t *macs);
 
+/* split.c: make the shapes strong discs, and fit them with one as two that are far apart: the one
+ * and the direction that promise the least F. Its cost is infinite if the work was spent before. */
+void eits_joint_set_apart(eits_context *ctx, eits_joint *j, uint64_t *macs);
+
+/* Return 1 for a light touch that is as large as two strong ones: the data hardly tell it from
+ * these. */
+int eits_joint_is_large(const eits_context *ctx, const eits_shape *s);
+
 /* Return 1 if two shapes count as two touches: they are far enough apart and of similar strength.
  */
 int eits_joint_are_two(const eits_shape *a, const eits_shape *b);

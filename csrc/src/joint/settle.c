@@ -1,6 +1,7 @@
 /* Decide which model describes the touches: discs, ellipses, or one touch as two. */
 #include "joint/joint.h"
 
+#include "context/places.h"
 #include "joint/constants.h"
 
 /* As ellipses, where discs leave more than noise; *j becomes that where F falls by enough. Nothing
@@ -22,25 +23,55 @@ static void try_ellipses(eits_context *ctx, eits_joint *j, uint64_t *macs)
     eits_joint_back(ctx, j);
 }
 
-/* Whether touches are sought: in a crowd some may be missing, or too many. On a sheet that has
- * drifted the image shows many light touches, which leave much; there nothing is sought. */
-static int may_miss(const eits_context *ctx, const eits_joint *j)
+/* Whether the shapes leave more than noise. */
+static int leaves_more(const eits_context *ctx, const eits_joint *j)
+{
+    return j->misfit > EITS_JOINT_SEARCHED * eits_joint_freedom(ctx, j);
+}
+
+/* Whether touches may be sought. On a sheet that has drifted the image shows many light touches,
+ * which leave much; there nothing is sought. */
+static int may_search(const eits_context *ctx, const eits_joint *j)
 {
     uint32_t strong = 0;
     for (uint32_t k = 0; k < j->count; ++k)
         strong += !eits_joint_is_light(&j->shape[k]);
-    return j->searches && j->count >= EITS_JOINT_CROWD &&
+    return j->searches &&
            (2u * strong > j->count || j->misfit < EITS_JOINT_LIGHT_SEARCHABLE * ctx->joint.energy);
 }
 
-/* Search from `discs`; *j becomes what is found, where that fits better, or needs fewer touches. */
-static void try_search(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
-                       const eits_joint *discs, uint64_t *macs)
+/* Whether one of few shapes may stand for two touches: they leave more than noise, or one of them
+ * is light and so large that it fits what two touches answer. */
+static int few_may_miss(const eits_context *ctx, const eits_joint *j)
 {
-    eits_joint found = *discs;
+    int open = leaves_more(ctx, j);
+    for (uint32_t k = 0; k < j->count; ++k)
+        open |= eits_joint_is_large(ctx, &j->shape[k]);
+    return open && j->count > 1 && j->count < EITS_JOINT_CROWD &&
+           j->count < ctx->options.max_touches && may_search(ctx, j) && !eits_weighs_errors(ctx);
+}
+
+/* Whether touches are sought: in a crowd some may be missing, or too many. */
+static int may_miss(const eits_context *ctx, const eits_joint *j)
+{
+    return (j->count >= EITS_JOINT_CROWD && may_search(ctx, j)) || few_may_miss(ctx, j);
+}
+
+/* Search from `first`, or one of few shapes as two (`apart`); *j becomes what is found, where that
+ * fits better, or where a crowd needs fewer touches. Of few, the test says which are none. */
+static void try_search(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
+                       const eits_joint *first, int apart, uint64_t *macs)
+{
+    eits_joint found = *first;
+    if (*macs > eits_joint_limit(ctx, j, UINT64_MAX))
+        return;
     eits_joint_keep(ctx, j);
-    eits_joint_search(ctx, scratch, &found, macs);
-    const eits_real fall = found.count < j->count ? -EITS_JOINT_NEEDED : EITS_JOINT_SPLIT_FALL;
+    if (apart)
+        eits_joint_set_apart(ctx, &found, macs);
+    else
+        eits_joint_search(ctx, scratch, &found, macs);
+    const int fewer = found.count < j->count && j->count >= EITS_JOINT_CROWD;
+    const eits_real fall = fewer ? -EITS_JOINT_NEEDED : EITS_JOINT_SPLIT_FALL;
     if (j->cost - found.cost > fall * eits_joint_excess(ctx, &found))
         *j = found;
     else
@@ -59,14 +90,16 @@ void eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_join
     eits_joint_free_all(j);
     eits_joint_descend(ctx, j, 2, folds + EITS_JOINT_HOPELESS, macs);
     j->further = j->most;
+    const eits_joint first = *j;
     if (j->parameters == EITS_JOINT_DISC) {
-        const eits_joint discs = *j;
         if (j->count * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS &&
             j->misfit > folds + EITS_JOINT_FITS && 3u * (*macs - begin) < most && *macs < j->most)
             try_ellipses(ctx, j, macs);
-        if (may_miss(ctx, j) && *macs < eits_joint_limit(ctx, j, UINT64_MAX))
-            try_search(ctx, scratch, j, &discs, macs);
+        if (may_miss(ctx, j))
+            try_search(ctx, scratch, j, &first, 0, macs);
     }
+    if (few_may_miss(ctx, j))
+        try_search(ctx, scratch, j, &first, 1, macs);
     if (eits_joint_excess(ctx, j) < EITS_JOINT_LOST)
         eits_joint_split(ctx, j, macs);
     eits_joint_choose_kinds(ctx, j, *macs - begin, macs);

@@ -12,6 +12,9 @@
 
 enum { DIRECTIONS = 4 };
 
+/* the radius of a disc of half the area */
+#define HALF_AREA R(0.70710678118654752440)
+
 /* The longest touch that was not tried; j->count where there is none. */
 static uint32_t longest(const eits_joint *j, const uint8_t *tried)
 {
@@ -51,6 +54,22 @@ static eits_real reach(const eits_shape *s, eits_real x, eits_real y)
     return eits_sqrt(r2 * (1 - eta * eta) / (sum - difference));
 }
 
+/* Shape k becomes two of its kind that are `away` from its middle along an axis. The second one is
+ * the last shape, and only these two are free. */
+static void divide(eits_joint *j, uint32_t k, const eits_real axis[2], eits_real away)
+{
+    eits_shape *a = &j->shape[k], *b = &j->shape[j->count];
+    *b = *a;
+    a->x = eits_fma(away, axis[0], a->x);
+    a->y = eits_fma(away, axis[1], a->y);
+    b->x = eits_fma(-away, axis[0], b->x);
+    b->y = eits_fma(-away, axis[1], b->y);
+    j->from[j->count] = j->from[k];
+    j->free_count = 2;
+    j->free[0] = k;
+    j->free[1] = j->count++;
+}
+
 /* Two strong touches in the place of shape k, the second one last: they have its strength, its
  * extent across the line of their middles, and its second moment along it. With half axes w along
  * that line and middles h to either side of the one's, two have h^2 + w^2 / 4 there; the one, which
@@ -58,11 +77,11 @@ static eits_real reach(const eits_shape *s, eits_real x, eits_real y)
 static eits_joint as_two(const eits_joint *one, uint32_t k, int d)
 {
     eits_joint two = *one;
-    eits_shape *a = &two.shape[k], *b = &two.shape[two.count++];
+    eits_shape *a = &two.shape[k];
     eits_real axis[2];
     direction(a, d, axis);
     const eits_real length = reach(a, axis[0], axis[1]), area = a->radius * a->radius;
-    a->radius *= R(0.70710678118654752440);
+    a->radius *= HALF_AREA;
     *a = eits_joint_as_strong(a);
     const eits_real r2 = a->radius * a->radius, narrow = eits_sqrt(r2 / EITS_JOINT_SPLIT_ASPECT),
                     wide = eits_larger(r2 * length / area, narrow), across = r2 / wide,
@@ -73,17 +92,56 @@ static eits_joint as_two(const eits_joint *one, uint32_t k, int d)
     a->e1 = eits_clamp(-eta * eits_fma(axis[0], axis[0], -(axis[1] * axis[1])), -EITS_JOINT_MAX_ETA,
                        EITS_JOINT_MAX_ETA);
     a->e2 = eits_clamp(-eta * 2 * axis[0] * axis[1], -EITS_JOINT_MAX_ETA, EITS_JOINT_MAX_ETA);
-    *b = *a;
-    a->x = eits_fma(away, axis[0], a->x);
-    a->y = eits_fma(away, axis[1], a->y);
-    b->x = eits_fma(-away, axis[0], b->x);
-    b->y = eits_fma(-away, axis[1], b->y);
-    two.from[one->count] = one->from[k];
+    divide(&two, k, axis, away);
     two.parameters = EITS_JOINT_ELLIPSE;
-    two.free_count = 2;
-    two.free[0] = k;
-    two.free[1] = one->count;
     return two;
+}
+
+/* Whether shape k and the last one have their middles on the skin. */
+static int are_on_skin(const eits_context *ctx, const eits_joint *two, uint32_t k)
+{
+    const eits_shape *a = &two->shape[k], *b = &two->shape[two->count - 1u];
+    return eits_pole_on_skin(ctx, a->x, a->y) && eits_pole_on_skin(ctx, b->x, b->y);
+}
+
+void eits_joint_set_apart(eits_context *ctx, eits_joint *j, uint64_t *macs)
+{
+    const eits_real away = EITS_JOINT_FAR_APART * eits_joint_usual(ctx, 0, 0, 0).radius;
+    uint32_t rounds = 2;
+    j->parameters = EITS_JOINT_DISC;
+    j->cost = R(INFINITY);
+    j->further = j->most =
+        eits_joint_limit(ctx, j, *macs + eits_fit_limit(ctx, EITS_JOINT_SEARCH_WORK));
+    for (uint32_t k = 0; k < j->count; ++k) {
+        j->shape[k] = eits_joint_as_strong(&j->shape[k]);
+        j->shape[k].e1 = j->shape[k].e2 = 0;
+    }
+    eits_joint best = *j;
+    eits_pole_clear(ctx, j->count);
+    for (uint32_t k = 0; k < j->count && *macs < j->most; ++k) {
+        eits_joint_free_one(j, k);
+        *macs += eits_joint_hold(ctx, j, rounds);
+        rounds = 0;
+        for (int d = 0; d < DIRECTIONS; ++d) {
+            eits_joint two = *j;
+            eits_real axis[2];
+            direction(&j->shape[k], d, axis);
+            two.shape[k].radius *= HALF_AREA;
+            divide(&two, k, axis, away);
+            if (!are_on_skin(ctx, &two, k))
+                continue;
+            two.cost = eits_joint_expect(ctx, &two, macs);
+            if (two.cost < best.cost)
+                best = two;
+        }
+        *macs += eits_joint_restore(ctx, j, k);
+    }
+    if (best.count > j->count) {
+        eits_joint_free_all(&best);
+        eits_pole_clear(ctx, best.count);
+        eits_joint_descend(ctx, &best, 2, R(INFINITY), macs);
+    }
+    *j = best;
 }
 
 int eits_joint_are_two(const eits_shape *a, const eits_shape *b)
@@ -99,9 +157,9 @@ int eits_joint_are_two(const eits_shape *a, const eits_shape *b)
            q / p > EITS_JOINT_SPLIT_WEAKER;
 }
 
-/* A light touch that is as large as two strong ones: the data hardly tell it from these, so they
- * are tried though it fits, and have to lower F by less. */
-static int is_large(const eits_context *ctx, const eits_shape *s)
+/* Two strong touches in its place are tried though the light one fits, and have to lower F by less.
+ */
+int eits_joint_is_large(const eits_context *ctx, const eits_shape *s)
 {
     return eits_joint_is_light(s) && eits_joint_offset(ctx, s, 2) > EITS_JOINT_LIGHT_LARGE;
 }
@@ -110,9 +168,9 @@ static int is_large(const eits_context *ctx, const eits_shape *s)
  * disc than beside an ellipse, which has two numbers more. */
 static eits_real needed_fall(const eits_context *ctx, const eits_joint *j, uint32_t k)
 {
-    const eits_real fall = is_large(ctx, &j->shape[k])           ? EITS_JOINT_SPLIT_LARGE
-                           : j->parameters == EITS_JOINT_ELLIPSE ? EITS_JOINT_SPLIT_SHAPED
-                                                                 : EITS_JOINT_SPLIT_FALL;
+    const eits_real fall = eits_joint_is_large(ctx, &j->shape[k]) ? EITS_JOINT_SPLIT_LARGE
+                           : j->parameters == EITS_JOINT_ELLIPSE  ? EITS_JOINT_SPLIT_SHAPED
+                                                                  : EITS_JOINT_SPLIT_FALL;
     return eits_weighs_errors(ctx) ? EITS_JOINT_SPLIT_FAR * fall : fall;
 }
 
@@ -144,8 +202,7 @@ static int best_two(eits_context *ctx, const eits_joint *one, uint32_t k, eits_j
          ++d) {
         /* what is clearly long is cut across first */
         eits_joint two = as_two(one, k, is_long ? DIRECTIONS - 1 - d : d);
-        if (!eits_pole_on_skin(ctx, two.shape[k].x, two.shape[k].y) ||
-            !eits_pole_on_skin(ctx, two.shape[one->count].x, two.shape[one->count].y))
+        if (!are_on_skin(ctx, &two, k))
             continue;
         const eits_real expected = eits_joint_expect(ctx, &two, spent);
         current = expected < least;
@@ -179,7 +236,7 @@ static int is_doubtful(const eits_context *ctx, const eits_joint *j, uint32_t k)
 {
     const eits_real more =
         j->parameters == EITS_JOINT_ELLIPSE ? EITS_JOINT_SPLIT_ELLIPSE : EITS_JOINT_SPLIT_MISFIT;
-    return j->misfit > eits_joint_freedom(ctx, j) + more || is_large(ctx, &j->shape[k]);
+    return j->misfit > eits_joint_freedom(ctx, j) + more || eits_joint_is_large(ctx, &j->shape[k]);
 }
 
 /* Whether one more shape may be tried. A crowd of discs is searched instead (search.c). */
