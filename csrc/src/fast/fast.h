@@ -346,6 +346,11 @@ int eits_fast_decides(const eits_fast *fast);
  * `place` lies; `count` if none is. */
 uint32_t eits_fast_whole_palm(const eits_fast *fast, const eits_touch *found,
                               const eits_real (*at)[2], uint32_t count, const eits_real *place);
+/* Return a bit for each of the places beside which a frame found a touch, if there are two or more
+ * and it agrees with none of them: the solver has taken two touches for a wide one, and drives
+ * explain the frame. 0: none. */
+uint32_t eits_fast_between(const eits_fast *fast, const eits_real (*places)[2], uint32_t count,
+                           const eits_real *found);
 /* When drives begin again: let them find the touches that they followed before. */
 void eits_fast_expect_again(eits_fast *fast);
 /* Return the id of a touch that starts at `place`. */

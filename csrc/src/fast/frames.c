@@ -334,10 +334,18 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
     mask_named(fast);
     match(fast, found, (const eits_real(*)[2])at, count, owner);
     uint32_t seen = 0;
+    eits_real places[EITS_FAST_MAX_TOUCHES][2];
+    for (uint32_t k = 0; k < fast->count; ++k)
+        eits_copy(places[k],
+                  fast->known[k].aligned ? fast->known[k].at : fast->state + FAST_SIZE * k, 2);
     for (uint32_t n = 0; n < count; ++n) {
         if (owner[n] == FAST_NONE)
             continue;
-        seen |= 1u << owner[n];
+        const uint32_t between =
+            eits_fast_between(fast, (const eits_real(*)[2])places, fast->count, at[n]);
+        seen |= 1u << owner[n] | between;
+        if (between != 0)
+            continue;
         correct(fast, owner[n], at[n], fast->sign * found[n].strength_s_per_m_mm2,
                 fast_is_whole_palm(fast, &found[n]));
     }

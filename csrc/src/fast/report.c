@@ -225,6 +225,19 @@ uint32_t eits_fast_whole_palm(const eits_fast *fast, const eits_touch *found,
     return n;
 }
 
+uint32_t eits_fast_between(const eits_fast *fast, const eits_real (*places)[2], uint32_t count,
+                           const eits_real *found)
+{
+    uint32_t near = 0;
+    for (uint32_t k = 0; k < count && fast->frame_explained; ++k) {
+        const eits_real far2 = fast_distance2(places[k], found);
+        if (far2 < fast_square(EITS_FAST_AGREE_MM))
+            return 0;
+        near |= (uint32_t)(far2 < fast_square(EITS_FAST_APART_MM)) << k;
+    }
+    return (near & (near - 1)) != 0 ? near : 0;
+}
+
 /* ---- touches that drives may find ---- */
 
 static void expect(eits_fast *fast, uint32_t id, eits_real x_mm, eits_real y_mm)
@@ -320,10 +333,14 @@ static void weigh_places(const eits_fast_touch *followed, eits_touch *found)
 static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, uint32_t count,
                                 int smeared, uint8_t *taken, eits_touch *touches)
 {
-    eits_real at[EITS_MAX_TOUCHES][2];
+    eits_real at[EITS_MAX_TOUCHES][2], followed[EITS_FAST_MAX_TOUCHES][2];
     for (uint32_t n = 0; n < count; ++n) {
         at[n][0] = found[n].x_mm;
         at[n][1] = found[n].y_mm;
+    }
+    for (uint32_t k = 0; k < fast->n_followed; ++k) {
+        followed[k][0] = fast->followed[k].x_mm;
+        followed[k][1] = fast->followed[k].y_mm;
     }
     uint32_t reported = 0;
     for (uint32_t k = 0; k < fast->n_followed; ++k) {
@@ -339,7 +356,9 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
             n < count && fast_distance2(at[n], place) < fast_square(EITS_FAST_AGREE_MM);
         /* where the two differ, the frame's place is the better one; but of a palm it has discs */
         const int palm = fast_is_palm(fast_square(EITS_FAST_SOFT_RADIUS * t->radius_mm));
-        const int shown = !smeared && (agrees || (n < count && !palm));
+        const int between = n < count && eits_fast_between(fast, (const eits_real(*)[2])followed,
+                                                           fast->n_followed, at[n]) != 0;
+        const int shown = !smeared && (agrees || (n < count && !palm && !between));
         eits_touch *touch = &touches[reported++];
         *touch = shown ? found[n] : alone(fast, t);
         if (shown)

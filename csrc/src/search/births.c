@@ -316,16 +316,25 @@ static void end_pair(eits_fast *fast)
         best->lead = rival->left - best->left;
 }
 
-/* A young touch that was two: it goes, and two come. */
+static int explains(const eits_fast *fast, fast_which which)
+{
+    const fast_trial *trial = &fast->search.trial[which];
+    return trial->exists && eits_is_noise(fast, trial, trial->fresh);
+}
+
+/* A young touch that was two: it goes, and two come. One touch beside it explains two fingers well
+ * at a wrong place, and is not believed then. */
 static uint32_t cost_of_split(const eits_fast *fast)
 {
     uint32_t k;
-    return one_is_not_enough(fast) && odd(fast) && eits_search_near(fast, &k) &&
-                   fast->known[k].age < EITS_FAST_YOUNG
+    return search_one(fast)->exists && fast->search.count > 2 && !explains(fast, FAST_MOVE) &&
+                   !explains(fast, FAST_REPLACE) && !eits_is_believed(fast, search_one(fast)) &&
+                   eits_search_near(fast, &k) && fast->known[k].age < EITS_FAST_YOUNG
                ? 2 * search_last(fast, EITS_FAST_SHORT_DRIVES)
                : 0;
 }
 
+/* The two begin on either side of the known touch, towards where another one would explain most. */
 static void look_for_split(eits_fast *fast)
 {
     fast_trial *trial = search_trial(fast, FAST_SPLIT);
@@ -334,14 +343,16 @@ static void look_for_split(eits_fast *fast)
     if (!eits_search_near(fast, &k))
         return;
     const eits_real *known = fast->state + FAST_SIZE * k;
-    const eits_real away[2] = {known[0] - (other[0] - known[0]) / 2,
-                               known[1] - (other[1] - known[1]) / 2};
+    const eits_real far = eits_sqrt(fast_distance2(known, other));
+    const eits_real by = far > 0 ? EITS_FAST_HALF_PAIR_MM / far : 0;
+    const eits_real x = by * (other[0] - known[0]), y = by * (other[1] - known[1]);
+    const eits_real a[2] = {known[0] - x, known[1] - y}, b[2] = {known[0] + x, known[1] + y};
     eits_trial_begin(fast, trial, EITS_FAST_SHORT_DRIVES);
-    eits_trial_add_new(trial, away, 0);
-    eits_trial_add_new(trial, other, 0);
+    eits_trial_add_new(trial, a, 0);
+    eits_trial_add_new(trial, b, 0);
     trial->gone = (uint8_t)k;
     (void)eits_trial_say(fast, trial);
-    eits_trial_refine(fast, trial, 2);
+    eits_trial_refine(fast, trial, 3);
 }
 
 static void end_split(eits_fast *fast)

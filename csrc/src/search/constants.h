@@ -49,9 +49,18 @@
  * second touch is looked for late; smaller: it is looked for in vain */
 #define EITS_FAST_LEFT_SD R(2.0)
 
+/* a first touch whose signal is hardly above noise starts at once up to this distance, else after
+ * two decisions. On pairs of hands in time, seed 7 [deviations]. larger: two fingers that land at
+ * once start as one between them; smaller: later starts */
+#define EITS_FAST_SURE_SD R(0.5)
+
 /* greatest standard deviation of a new touch's place [mm]. larger: wrong first places; smaller:
  * later starts */
 #define EITS_FAST_SPREAD_MM R(1.8)
+
+/* the same of two touches that take the place of a young one. On pairs of hands in time, seed 7
+ * [mm]. larger: wrong places; smaller: one touch stays between two fingers */
+#define EITS_FAST_SPLIT_SPREAD_MM R(8.0)
 
 /* a new touch must explain more than at the best rival place by this [of what it explains]. larger:
  * later starts; smaller: false touches */

@@ -30,10 +30,13 @@ static int is_apart(const eits_fast *fast, const fast_trial *trial)
     return trial->fresh < 2 || fast_apart(trial->body[first].p, trial->body[first + 1].p);
 }
 
-static int is_believed(const eits_fast *fast, const fast_trial *trial)
+int eits_is_believed(const eits_fast *fast, const fast_trial *trial)
 {
     eits_real covariance[FAST_FIT][FAST_FIT];
     const eits_real doubt = eits_doubt(fast, trial);
+    /* where one touch stands between two fingers, rough places are better than its own */
+    const eits_real most =
+        trial->gone != FAST_NONE ? EITS_FAST_SPLIT_SPREAD_MM : EITS_FAST_SPREAD_MM;
     if (fast->count + trial->fresh - (trial->gone != FAST_NONE) > EITS_FAST_MAX_TOUCHES ||
         !eits_trial_covariance(trial, covariance))
         return 0;
@@ -41,9 +44,8 @@ static int is_believed(const eits_fast *fast, const fast_trial *trial)
     for (uint32_t i = 0; i < trial->bodies; at += trial->body[i++].numbers) {
         const uint32_t which = i + trial->fresh - trial->bodies;
         const eits_real spread = covariance[at][at] + covariance[at + 1][at + 1];
-        if (trial->body[i].known == FAST_NONE &&
-            (!(trial->own[which] > EITS_FAST_BIRTH * doubt) ||
-             !(doubt * spread < fast_square(EITS_FAST_SPREAD_MM))))
+        if (trial->body[i].known == FAST_NONE && (!(trial->own[which] > EITS_FAST_BIRTH * doubt) ||
+                                                  !(doubt * spread < fast_square(most))))
             return 0;
     }
     const eits_real clear = EITS_FAST_AMBIGUOUS * trial->own[trial->fresh - 1];
@@ -83,7 +85,7 @@ static int beats_its_moves(const eits_fast *fast, const fast_trial *both)
 static int may_be_born(eits_fast *fast, fast_which which)
 {
     const fast_trial *trial = &fast->search.trial[which];
-    if (!trial->exists || !is_believed(fast, trial))
+    if (!trial->exists || !eits_is_believed(fast, trial))
         return 0;
     return which != FAST_BOTH || beats_its_moves(fast, trial);
 }
@@ -95,6 +97,16 @@ static int near_last(const fast_search *s, const eits_real *place, eits_real rea
             return 1;
     }
     return 0;
+}
+
+/* Whether a clear birth need not come out again. The first touch has no rival that is known
+ * already, and is awaited the most; but while its signal is hardly above noise, one touch may
+ * explain two that land at once, and must leave less. */
+static int is_beyond_doubt(const eits_fast *fast, const fast_trial *trial)
+{
+    if (fast->count == 0 && trial->fresh == 1)
+        return search_is_sudden(trial) || eits_is_sure(fast, trial);
+    return trial->count >= EITS_FAST_STABLE_DRIVES;
 }
 
 /* Whether this birth has come out as often as it must. */
@@ -118,11 +130,9 @@ static int is_stable(eits_fast *fast, const fast_trial *trial)
     s->last_at = s->decisions;
     for (uint32_t i = 0; i < trial->fresh; ++i)
         eits_copy(s->last[i], body[i].p, 2);
-    /* the first touch has no rival that is known already, and is awaited the most */
-    const int first_of_all = fast->count == 0 && trial->fresh == 1;
     uint32_t need = crowd ? EITS_FAST_STABLE_CROWD : EITS_FAST_STABLE;
     if (eits_is_clear(fast, trial, trial->fresh))
-        need = first_of_all || trial->count >= EITS_FAST_STABLE_DRIVES ? 1 : EITS_FAST_STABLE;
+        need = is_beyond_doubt(fast, trial) ? 1 : EITS_FAST_STABLE;
     if (s->last_times < need)
         return 0;
     s->last_count = 0;

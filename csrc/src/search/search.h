@@ -57,6 +57,13 @@ static inline int search_rests(const eits_fast *fast, uint32_t k)
            !fast_is_palm(known->rho2);
 }
 
+/* Whether a new touch explains so much of each drive that it has landed at once. The signal of one
+ * that grows begins near noise, where one touch explains two that land at once as well. */
+static inline int search_is_sudden(const fast_trial *trial)
+{
+    return trial->own[0] > EITS_FAST_SUDDEN * (eits_real)trial->count;
+}
+
 /* Return the cost of a look at `bodies` of the trial, in answers. If the known touches are where
  * they were, their answers are in the ring already, and only the equations are computed. */
 static inline uint32_t search_cost(const fast_trial *trial, uint32_t bodies)
@@ -119,6 +126,10 @@ int eits_trial_covariance(const fast_trial *trial, eits_real covariance[FAST_FIT
 int eits_is_noise(const eits_fast *fast, const fast_trial *trial, uint32_t fresh);
 /* The same with a tighter bound: no other hypothesis needs to be looked for. */
 int eits_is_clear(const eits_fast *fast, const fast_trial *trial, uint32_t fresh);
+/* The same with a bound that noise alone passes in two of three cases. */
+int eits_is_sure(const eits_fast *fast, const fast_trial *trial);
+/* Return 1 if new touches of the trial are beyond doubt, compared with noise and with rivals. */
+int eits_is_believed(const eits_fast *fast, const fast_trial *trial);
 /* Return the cost of a new touch, in chi^2. */
 eits_real eits_cost_of_birth(const fast_trial *trial);
 /* Carry out the best hypothesis, or wait. Returns 1 if one was carried out. */
