@@ -90,7 +90,7 @@ void eits_apply_move(eits_fast *fast, const fast_trial *trial)
 static int may_move(const eits_fast *fast, const fast_trial *trial, uint32_t which)
 {
     const uint32_t last = trial->count - 1u, first = last > 1 ? 1 : 0;
-    return fast->count == 0 && trial->fresh == 1 && search_is_sudden(trial) &&
+    return fast->count == 0 && trial->fresh == 1 && search_is_sudden(fast, trial) &&
            trial->strength[last][which] < EITS_FAST_GROWS * trial->strength[first][which];
 }
 

@@ -322,6 +322,25 @@ static int explains(const eits_fast *fast, fast_which which)
     return trial->exists && eits_is_noise(fast, trial, trial->fresh);
 }
 
+/* What the last searches made of a touch serves for a while. */
+static int split_is_known(const eits_fast *fast)
+{
+    const fast_search *s = &fast->search;
+    return s->split_at > 0 && s->decisions + 1 - s->split_at <= 3 &&
+           s->trial[FAST_SPLIT].gone < fast->count;
+}
+
+/* The young touch that may be two. */
+static int may_be_two(const eits_fast *fast, uint32_t *k)
+{
+    const int found = eits_search_near(fast, k);
+    if (split_is_known(fast))
+        *k = fast->search.trial[FAST_SPLIT].gone;
+    else if (!found)
+        return 0;
+    return fast->known[*k].age < EITS_FAST_YOUNG;
+}
+
 /* A young touch that was two: it goes, and two come. One touch beside it explains two fingers well
  * at a wrong place, and is not believed then. */
 static uint32_t cost_of_split(const eits_fast *fast)
@@ -329,27 +348,31 @@ static uint32_t cost_of_split(const eits_fast *fast)
     uint32_t k;
     return search_one(fast)->exists && fast->search.count > 2 && !explains(fast, FAST_MOVE) &&
                    !explains(fast, FAST_REPLACE) && !eits_is_believed(fast, search_one(fast)) &&
-                   eits_search_near(fast, &k) && fast->known[k].age < EITS_FAST_YOUNG
+                   may_be_two(fast, &k)
                ? 2 * search_last(fast, EITS_FAST_SHORT_DRIVES)
                : 0;
 }
 
-/* The two begin on either side of the known touch, towards where another one would explain most. */
+/* The two begin where the last search left them, or on either side of the known touch, towards
+ * where another one would explain most. */
 static void look_for_split(eits_fast *fast)
 {
     fast_trial *trial = search_trial(fast, FAST_SPLIT);
     const eits_real *other = search_one(fast)->body[0].p;
     uint32_t k;
-    if (!eits_search_near(fast, &k))
+    if (!may_be_two(fast, &k))
         return;
     const eits_real *known = fast->state + FAST_SIZE * k;
-    const eits_real far = eits_sqrt(fast_distance2(known, other));
-    const eits_real by = far > 0 ? EITS_FAST_HALF_PAIR_MM / far : 0;
-    const eits_real x = by * (other[0] - known[0]), y = by * (other[1] - known[1]);
-    const eits_real a[2] = {known[0] - x, known[1] - y}, b[2] = {known[0] + x, known[1] + y};
+    eits_real place[2][2];
+    const eits_real by = EITS_FAST_HALF_PAIR_MM / eits_sqrt(fast_distance2(known, other));
+    for (uint32_t axis = 0; axis < 2; ++axis) {
+        const eits_real away = by * (other[axis] - known[axis]);
+        place[0][axis] = split_is_known(fast) ? trial->body[0].p[axis] : known[axis] - away;
+        place[1][axis] = split_is_known(fast) ? trial->body[1].p[axis] : known[axis] + away;
+    }
     eits_trial_begin(fast, trial, EITS_FAST_SHORT_DRIVES);
-    eits_trial_add_new(trial, a, 0);
-    eits_trial_add_new(trial, b, 0);
+    eits_trial_add_new(trial, place[0], 0);
+    eits_trial_add_new(trial, place[1], 0);
     trial->gone = (uint8_t)k;
     (void)eits_trial_say(fast, trial);
     eits_trial_refine(fast, trial, 3);
@@ -358,7 +381,10 @@ static void look_for_split(eits_fast *fast)
 static void end_split(eits_fast *fast)
 {
     fast_trial *trial = search_trial(fast, FAST_SPLIT);
+    const fast_trial *one = search_one(fast);
     trial->lead = trial->all;
+    if (trial->exists && trial->left * (eits_real)one->count < one->left * (eits_real)trial->count)
+        fast->search.split_at = fast->search.decisions + 1;
 }
 
 /* ---- a new touch while others move, and moves by the last drives alone ---- */

@@ -105,7 +105,7 @@ static int near_last(const fast_search *s, const eits_real *place, eits_real rea
 static int is_beyond_doubt(const eits_fast *fast, const fast_trial *trial)
 {
     if (fast->count == 0 && trial->fresh == 1)
-        return search_is_sudden(trial) || eits_is_sure(fast, trial);
+        return search_is_sudden(fast, trial) || eits_is_sure(fast, trial);
     return trial->count >= EITS_FAST_STABLE_DRIVES;
 }
 

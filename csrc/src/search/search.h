@@ -57,19 +57,19 @@ static inline int search_rests(const eits_fast *fast, uint32_t k)
            !fast_is_palm(known->rho2);
 }
 
-/* Whether a new touch explains so much of each drive that it has landed at once. The signal of one
- * that grows begins near noise, where one touch explains two that land at once as well. */
-static inline int search_is_sudden(const fast_trial *trial)
-{
-    return trial->own[0] > EITS_FAST_SUDDEN * (eits_real)trial->count;
-}
-
 /* Return the cost of a look at `bodies` of the trial, in answers. If the known touches are where
  * they were, their answers are in the ring already, and only the equations are computed. */
 static inline uint32_t search_cost(const fast_trial *trial, uint32_t bodies)
 {
     const uint32_t answers = bodies * trial->count;
     return trial->as_known ? (answers + 5) / 6 : answers;
+}
+
+/* Whether new touches were there in full from the trial's second drive on. The signal of a slower
+ * one begins near noise, where one touch explains two that land at once as well. */
+static inline int search_is_sudden(const eits_fast *fast, const fast_trial *trial)
+{
+    return search_drive(fast, trial, trial->count > 2)->chi2 > EITS_FAST_SUDDEN;
 }
 
 /* ---- known.c, births.c: pieces ---- */

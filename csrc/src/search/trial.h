@@ -95,6 +95,7 @@ typedef struct fast_search {
     eits_real peak[2];     /* greatest cell of the map, mm */
     eits_real warm[2][2], pair[2][2]; /* places that the last searches found */
     uint32_t warm_at, warm_count, pair_at, pair_known;
+    uint32_t split_at;      /* the decision after the last split; 0: none */
     uint32_t warm_explains; /* whether the first of them left the last search's drives no more than
                                noise */
     /* the new touches that the last decision would have added */
