@@ -230,7 +230,7 @@ static void set_by_frame(eits_fast *fast, uint32_t k, const eits_real *place, ei
 /* Touches that two frames on end have found and no drive; `at`: where the modelled skin has them.
  */
 static void seed(eits_fast *fast, const eits_touch *found, const eits_real (*at)[2],
-                 const uint8_t *owner, uint32_t count)
+                 const uint8_t *owner, uint32_t count, int decides)
 {
     const uint32_t known = fast->seeds;
     eits_real before[EITS_FAST_MAX_TOUCHES][2];
@@ -244,7 +244,7 @@ static void seed(eits_fast *fast, const eits_touch *found, const eits_real (*at)
             continue;
         /* Two frames on end, unless one decides: in a single one, a touch that landed while it was
          * scanned may stand at a wrong place. */
-        if ((!eits_fast_decides(fast) && !near_any(state, (const eits_real(*)[2])before, known)) ||
+        if ((!decides && !near_any(state, (const eits_real(*)[2])before, known)) ||
             fast->count == EITS_FAST_MAX_TOUCHES || near_known(fast, state)) {
             if (fast->seeds < EITS_FAST_MAX_TOUCHES)
                 eits_copy(fast->seed[fast->seeds++], state, 2);
@@ -318,6 +318,30 @@ static void correct(eits_fast *fast, uint32_t k, const eits_real *place, eits_re
     known->place_us = fast->aligned_us;
 }
 
+/* Two fingers that landed at once and were taken for a palm: a frame that drives explain shows two
+ * touches on it that are apart. The palm becomes the first of them. Returns whether it did. While
+ * a palm lands, frames may show several discs of it. */
+static int take_back(eits_fast *fast, uint32_t k, const eits_touch *found, const eits_real (*at)[2],
+                     uint32_t count)
+{
+    fast_known *known = &fast->known[k];
+    uint32_t on[2] = {0, 0}, near = 0;
+    if (!fast_is_palm(known->rho2) || known->age < EITS_FAST_YOUNG || !fast->frame_explained)
+        return 0;
+    for (uint32_t n = 0; n < count; ++n) {
+        if (fast_distance2(at[n], known->at) < fast_square(fast_room_mm(fast, k)))
+            on[near++ & 1u] = n;
+    }
+    const eits_touch *a = &found[on[0]], *b = &found[on[1]];
+    if (near != 2 ||
+        !(fast_distance2(at[on[0]], at[on[1]]) > fast_square(a->radius_mm + b->radius_mm)))
+        return 0;
+    known->rho2 = fast->rho2;
+    eits_copy(known->at, at[on[0]], 2);
+    set_by_frame(fast, k, at[on[0]], fast->sign * a->strength_s_per_m_mm2);
+    return 1;
+}
+
 eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t count)
 {
     uint8_t owner[EITS_MAX_TOUCHES];
@@ -332,6 +356,9 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
         eits_place_in_model(fast->ctx, at[n]);
     }
     mask_named(fast);
+    int decides = eits_fast_decides(fast);
+    for (uint32_t k = 0; k < fast->count; ++k)
+        decides |= take_back(fast, k, found, (const eits_real(*)[2])at, count);
     match(fast, found, (const eits_real(*)[2])at, count, owner);
     uint32_t seen = 0;
     eits_real places[EITS_FAST_MAX_TOUCHES][2];
@@ -361,7 +388,7 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
     for (uint32_t k = 0; k < fast->count; ++k)
         fast->known[k].aligned = 0;
     /* a frame with rows that are no touch's may show any */
-    seed(fast, found, (const eits_real(*)[2])at, owner, fast->wild == 0 ? count : 0);
+    seed(fast, found, (const eits_real(*)[2])at, owner, fast->wild == 0 ? count : 0, decides);
     fast->wild = 0;
     fast->decided = (uint32_t)eits_fast_decides(fast);
     return EITS_OK;

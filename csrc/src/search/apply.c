@@ -85,12 +85,18 @@ void eits_apply_move(eits_fast *fast, const fast_trial *trial)
         end(fast, trial);
 }
 
+/* Whether new touches were there in full from the trial's second drive on. */
+static int is_sudden(const eits_fast *fast, const fast_trial *trial)
+{
+    return search_drive(fast, trial, trial->count > 2)->chi2 > EITS_FAST_SUDDEN;
+}
+
 /* A first touch may move from its contact on, as a swipe does, where nothing else can drag it. One
  * that still grows is landing, and another may land beside it. */
 static int may_move(const eits_fast *fast, const fast_trial *trial, uint32_t which)
 {
     const uint32_t last = trial->count - 1u, first = last > 1 ? 1 : 0;
-    return fast->count == 0 && trial->fresh == 1 && search_is_sudden(fast, trial) &&
+    return fast->count == 0 && trial->fresh == 1 && is_sudden(fast, trial) &&
            trial->strength[last][which] < EITS_FAST_GROWS * trial->strength[first][which];
 }
 

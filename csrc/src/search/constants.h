@@ -49,11 +49,6 @@
  * second touch is looked for late; smaller: it is looked for in vain */
 #define EITS_FAST_LEFT_SD R(2.0)
 
-/* a first touch whose signal is hardly above noise starts at once up to this distance, else after
- * two decisions. On pairs of hands in time, seed 7 [deviations]. larger: two fingers that land at
- * once start as one between them; smaller: later starts */
-#define EITS_FAST_SURE_SD R(0.5)
-
 /* greatest standard deviation of a new touch's place [mm]. larger: wrong first places; smaller:
  * later starts */
 #define EITS_FAST_SPREAD_MM R(1.8)

@@ -99,16 +99,6 @@ static int near_last(const fast_search *s, const eits_real *place, eits_real rea
     return 0;
 }
 
-/* Whether a clear birth need not come out again. The first touch has no rival that is known
- * already, and is awaited the most; but while its signal is hardly above noise, one touch may
- * explain two that land at once, and must leave less. */
-static int is_beyond_doubt(const eits_fast *fast, const fast_trial *trial)
-{
-    if (fast->count == 0 && trial->fresh == 1)
-        return search_is_sudden(fast, trial) || eits_is_sure(fast, trial);
-    return trial->count >= EITS_FAST_STABLE_DRIVES;
-}
-
 /* Whether this birth has come out as often as it must. */
 static int is_stable(eits_fast *fast, const fast_trial *trial)
 {
@@ -130,9 +120,11 @@ static int is_stable(eits_fast *fast, const fast_trial *trial)
     s->last_at = s->decisions;
     for (uint32_t i = 0; i < trial->fresh; ++i)
         eits_copy(s->last[i], body[i].p, 2);
+    /* the first touch has no rival that is known already, and is awaited the most */
+    const int first_of_all = fast->count == 0 && trial->fresh == 1;
     uint32_t need = crowd ? EITS_FAST_STABLE_CROWD : EITS_FAST_STABLE;
     if (eits_is_clear(fast, trial, trial->fresh))
-        need = is_beyond_doubt(fast, trial) ? 1 : EITS_FAST_STABLE;
+        need = first_of_all || trial->count >= EITS_FAST_STABLE_DRIVES ? 1 : EITS_FAST_STABLE;
     if (s->last_times < need)
         return 0;
     s->last_count = 0;

@@ -107,28 +107,22 @@ eits_real eits_doubt(const eits_fast *fast, const fast_trial *trial)
 }
 
 /* Whether the trial leaves hardly more than noise does, whose mean is the freedom and whose
- * variance is twice that, by this number of deviations. A touch that is no disc may also leave
- * `part` of what it explains. */
+ * variance is twice that. A touch that is no disc may also leave `part` of what it explains. */
 static int leaves_noise(const eits_fast *fast, const fast_trial *trial, uint32_t fresh,
-                        eits_real part, eits_real deviations)
+                        eits_real part)
 {
     const eits_real free = freedom(fast, trial, fresh);
     const eits_real gain = trial->all - trial->left;
-    return trial->left <
-           free + deviations * eits_sqrt(2 * free) + fast_square(part) * (gain > 0 ? gain : 0);
+    return trial->left < free + EITS_FAST_LEFT_SD * eits_sqrt(2 * free) +
+                             fast_square(part) * (gain > 0 ? gain : 0);
 }
 
 int eits_is_noise(const eits_fast *fast, const fast_trial *trial, uint32_t fresh)
 {
-    return leaves_noise(fast, trial, fresh, EITS_FAST_BIRTH_ERROR, EITS_FAST_LEFT_SD);
+    return leaves_noise(fast, trial, fresh, EITS_FAST_BIRTH_ERROR);
 }
 
 int eits_is_clear(const eits_fast *fast, const fast_trial *trial, uint32_t fresh)
 {
-    return leaves_noise(fast, trial, fresh, EITS_FAST_CLEAR_ERROR, EITS_FAST_LEFT_SD);
-}
-
-int eits_is_sure(const eits_fast *fast, const fast_trial *trial)
-{
-    return leaves_noise(fast, trial, trial->fresh, EITS_FAST_CLEAR_ERROR, EITS_FAST_SURE_SD);
+    return leaves_noise(fast, trial, fresh, EITS_FAST_CLEAR_ERROR);
 }

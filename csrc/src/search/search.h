@@ -65,13 +65,6 @@ static inline uint32_t search_cost(const fast_trial *trial, uint32_t bodies)
     return trial->as_known ? (answers + 5) / 6 : answers;
 }
 
-/* Whether new touches were there in full from the trial's second drive on. The signal of a slower
- * one begins near noise, where one touch explains two that land at once as well. */
-static inline int search_is_sudden(const eits_fast *fast, const fast_trial *trial)
-{
-    return search_drive(fast, trial, trial->count > 2)->chi2 > EITS_FAST_SUDDEN;
-}
-
 /* ---- known.c, births.c: pieces ---- */
 
 extern const search_piece eits_piece_move, eits_piece_one, eits_piece_rival, eits_piece_more;
@@ -126,8 +119,6 @@ int eits_trial_covariance(const fast_trial *trial, eits_real covariance[FAST_FIT
 int eits_is_noise(const eits_fast *fast, const fast_trial *trial, uint32_t fresh);
 /* The same with a tighter bound: no other hypothesis needs to be looked for. */
 int eits_is_clear(const eits_fast *fast, const fast_trial *trial, uint32_t fresh);
-/* The same with a bound that noise alone passes in two of three cases. */
-int eits_is_sure(const eits_fast *fast, const fast_trial *trial);
 /* Return 1 if new touches of the trial are beyond doubt, compared with noise and with rivals. */
 int eits_is_believed(const eits_fast *fast, const fast_trial *trial);
 /* Return the cost of a new touch, in chi^2. */
