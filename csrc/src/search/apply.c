@@ -85,10 +85,12 @@ void eits_apply_move(eits_fast *fast, const fast_trial *trial)
         end(fast, trial);
 }
 
-/* Whether new touches were there in full from the trial's second drive on. */
-static int is_sudden(const eits_fast *fast, const fast_trial *trial)
+/* A touch whose signal was there in full from the trial's second drive on may swipe. A slower one
+ * hardly does, and another may land beside it. */
+static eits_real first_speed(const eits_fast *fast, const fast_trial *trial)
 {
-    return search_drive(fast, trial, trial->count > 2)->chi2 > EITS_FAST_SUDDEN;
+    const fast_held *second = search_drive(fast, trial, trial->count > 2);
+    return second->chi2 > EITS_FAST_SUDDEN ? EITS_FAST_FIRST_SPEED : EITS_FAST_FIRST_SLOW;
 }
 
 /* A first touch may move from its contact on, as a swipe does, where nothing else can drag it. One
@@ -96,7 +98,7 @@ static int is_sudden(const eits_fast *fast, const fast_trial *trial)
 static int may_move(const eits_fast *fast, const fast_trial *trial, uint32_t which)
 {
     const uint32_t last = trial->count - 1u, first = last > 1 ? 1 : 0;
-    return fast->count == 0 && trial->fresh == 1 && is_sudden(fast, trial) &&
+    return fast->count == 0 && trial->fresh == 1 &&
            trial->strength[last][which] < EITS_FAST_GROWS * trial->strength[first][which];
 }
 
@@ -116,7 +118,7 @@ static void new_state(const eits_fast *fast, const fast_trial *trial, uint32_t i
     covariance[FAST_C][FAST_C] = doubt * trial->variance[which];
     add_doubt(covariance, EITS_FAST_BORN_MM, EITS_FAST_BORN_STRENGTH * c,
               moves                          ? EITS_FAST_BORN_SPEED
-              : may_move(fast, trial, which) ? EITS_FAST_FIRST_SPEED
+              : may_move(fast, trial, which) ? first_speed(fast, trial)
                                              : 0);
     state[FAST_C] = c;
     for (uint32_t axis = 0; axis < 2; ++axis) {
