@@ -117,6 +117,52 @@ snr_db = 60.0
     assert max(np.hypot(one.x_mm - x_mm, one.y_mm - y_mm) for (one,) in frames) < 8
 
 
+@pytest.mark.parametrize(
+    ("a", "b", "radius_mm", "contrasts", "seed"),
+    [
+        ((20.482, -41.147), (4.804, -20.462), 6.749, (6.655, 9.108), 7025),
+        ((-24.323, -4.56), (-1.956, -13.977), 6.945, (5.959, 6.15), 7050),
+    ],
+)
+def test_two_fingers_that_land_at_once_are_not_one_between_them(
+    tmp_path, a, b, radius_mm, contrasts, seed
+):
+    path = tmp_path / "pair.toml"
+    touches = [
+        f"""[[touch]]
+radius_mm = {radius_mm}
+contrast = {contrast}
+path = [{{t_s = 0.2, x_mm = {x}, y_mm = {y}, press = 0.0}},
+        {{t_s = 0.23, x_mm = {x}, y_mm = {y}, press = 1.0}},
+        {{t_s = 0.83, x_mm = {x}, y_mm = {y}, press = 1.0}}]
+"""
+        for (x, y), contrast in zip((a, b), contrasts, strict=True)
+    ]
+    path.write_text(
+        f"""[scene]
+name = "pair"
+seed = {seed}
+rate_hz = 48.0
+frames = 36
+quiet_frames = 64
+elements = 5000
+{"".join(touches)}[effects.noise]
+snr_db = 60.0
+""",
+        encoding="utf-8",
+    )
+    told = followed(f"sim:{path}", PALM)
+    ends = np.array([a, b])
+
+    def between(item: Any) -> bool:
+        return any(np.hypot(*(ends - (t.x_mm, t.y_mm)).T).min() > 12 for t in item.touches)
+
+    frames = [item for item in told if isinstance(item, Frame)]
+    assert not any(map(between, frames))
+    assert sum(map(between, told)) <= 8
+    assert all(len(frame.touches) == 2 for frame in frames[-12:])
+
+
 def test_their_messages_keep_to_the_schema(recorded):
     validator = Draft202012Validator(schema())
     for item in recorded[1]:
