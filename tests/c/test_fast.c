@@ -273,7 +273,7 @@ static void follow_a_finger(eits_sign sign)
     check_reported(b, 1.0);
     CHECK_EQUAL(b->fast->count, 1);
     b->fingers = 0;
-    drives(b, EITS_FAST_GONE + 12);
+    drives(b, 4 * EITS_FAST_GONE); /* until it is sure that it has left nothing */
     CHECK_EQUAL(b->fast->count, 0);
 }
 
@@ -626,6 +626,31 @@ TEST(test_a_strong_touch_where_one_is_off_is_a_finger)
         }
         CHECK_EQUAL(count, strong);
     }
+}
+
+/* A finger that lifts leaves a part of its signal: it is not a touch, however short the finger was
+ * there. A new press at the same place is another touch. */
+TEST(test_what_a_finger_leaves)
+{
+    bench *b = bench_open(EITS_SIGN_INCREASE);
+    const double places[1][2] = {{20, 11}};
+    eits_fast_touch touches[EITS_FAST_MAX_TOUCHES];
+    drives(b, 8);
+    put(b, 0, 20, 11, 1);
+    drives(b, 40);
+    confirm(b, places, 1);
+    CHECK_EQUAL(reported(b, touches), 1);
+    const uint32_t first = touches[0].id;
+    put(b, 0, 20, 11, 0.2);
+    drives(b, 8);
+    for (uint32_t n = 0; n < 3 * EITS_FAST_GONE; ++n) {
+        drives(b, 1);
+        CHECK_EQUAL(reported(b, touches), 0);
+    }
+    put(b, 0, 20, 11, 0.6);
+    drives(b, 8);
+    CHECK_EQUAL(reported(b, touches), 1);
+    CHECK_EQUAL(touches[0].id, first + 1);
 }
 
 /* A frame is not solved while a drive of it waits for an explanation; but it is, as it was

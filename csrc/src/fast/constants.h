@@ -122,10 +122,15 @@
 
 /* a touch with less strength is off [of the greatest strength]. larger: touches end early; smaller:
  * late */
-#define EITS_FAST_OFF R(0.15)
+#define EITS_FAST_OFF R(0.25)
 
 /* a touch with more strength is on again [of the greatest strength]. as FAST_OFF */
-#define EITS_FAST_ON R(0.25)
+#define EITS_FAST_ON R(0.35)
+
+/* what a touch leaves at the lift is followed, unreported, if the touch was at least this old
+ * [drives]. larger: the creep of a tap is reported as a touch; smaller: wrong places are
+ * followed */
+#define EITS_FAST_LEAVES 24
 
 /* a touch that has been off for this long is forgotten [drives]. larger: an id outlasts its finger;
  * smaller: a bounce gives a new id */

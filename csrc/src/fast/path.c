@@ -350,11 +350,11 @@ static void speed_up(eits_fast *fast, uint32_t k, const eits_real *then)
 /* Whether a touch that lifted may have left a part of its signal, which fades in seconds because
  * the skin creeps. Such a touch is still followed, as one that is off, so that what it left is not
  * found as a new touch. If the signal has not faded when the peak is forgotten, a finger presses
- * lightly. A touch that was there for a shorter time may have been a wrong place at the rim of a
- * palm. */
+ * lightly. A touch that no frame has shown, or that was hardly there, may have been a wrong place.
+ */
 static int leaves_rest(const eits_fast *fast, const fast_known *known)
 {
-    return known->confirmed && known->age > EITS_FAST_WIDENS && known->energy >= EITS_FAST_FAINT &&
+    return known->confirmed && known->age >= EITS_FAST_LEAVES && known->energy >= EITS_FAST_FAINT &&
            fast->count < EITS_FAST_MAX_TOUCHES;
 }
 
