@@ -653,6 +653,30 @@ TEST(test_what_a_finger_leaves)
     CHECK_EQUAL(touches[0].id, first + 1);
 }
 
+/* A frame in which a touch grows by much may show it as several, which are not taken over. What is
+ * left of its drives is little; else the frame would not be solved. */
+TEST(test_a_touch_that_grows_stays_one)
+{
+    const double places[2][2] = {{20, 23}, {20, -1}};
+    eits_real aligned[SMALL_ROWS];
+    for (uint32_t grows = 0; grows < 2; ++grows) {
+        bench *b = bench_open(EITS_SIGN_INCREASE);
+        drives(b, 8);
+        put(b, 0, 20, 11, 0.5);
+        drives(b, 24);
+        (void)align(b, aligned);
+        put(b, 0, 20, 11, grows ? 1 : 0.5);
+        drives(b, 7);
+        b->fast->drive[2].explained = 0;
+        b->fast->news = EITS_FAST_LITTLE_NEWS / 2;
+        CHECK_EQUAL(align(b, aligned), EITS_FAST_TRUSTED);
+        CHECK_EQUAL(b->fast->smeared, grows ? FAST_GROWS : 0);
+        find(b, places, 2);
+        CHECK_EQUAL(b->fast->known[0].last, grows ? FAST_NOT_SEEN : FAST_ELSEWHERE);
+        CHECK_EQUAL(b->fast->seeds, grows ? 0 : 1);
+    }
+}
+
 /* A frame is not solved while a drive of it waits for an explanation; but it is, as it was
  * measured, while an electrode is named. */
 TEST(test_frames_of_a_named_electrode_are_solved)

@@ -130,6 +130,24 @@ TEST(where_the_two_differ_the_frame_is_shown)
     CHECK(t[0].id == 3 && t[0].x_mm == 0 && t[0].explained == 0);
 }
 
+/* The solver takes a palm that lands for several touches. If a touch grew by much while the frame
+ * was scanned, and drives have it as one, the frame shows that one. */
+TEST(a_touch_that_grows_is_not_several)
+{
+    const eits_fast_touch finger = {.id = 3, .strength_s_per_m_mm2 = 1, .radius_mm = 7};
+    const eits_touch found[2] = {at(12, 0, 0.5), at(-13, 0, 0.4)};
+    set_up();
+    for (uint32_t count = 1; count <= 2; ++count) {
+        for (uint32_t grows = 0; grows < 2; ++grows) {
+            drives_follow(&finger, 1);
+            fast->smeared = grows ? FAST_GROWS : 0;
+            CHECK_EQUAL(report(found, count), 1);
+            CHECK_NEAR(t[0].x_mm, grows && count == 2 ? 0 : 12, 0.01);
+            fast->n_seen = 0;
+        }
+    }
+}
+
 /* In noise the place lies between that of the frame and that of drives, nearer to the more certain
  * one. A place that drives have lost counts for nothing. */
 TEST(places_of_frame_and_drives_are_weighed)

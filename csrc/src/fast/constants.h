@@ -8,8 +8,10 @@
 /* clang-format off */
 
 /* ---- Chosen: on presses, swipes and pairs in time of seed 101 at 60 and 40 dB, and on hands in
- * time of seeds 31 and 32; the study reports on seed 202. Some stand as in the prototypes and were
- * not varied. Check: eitskin study fast-path */
+ * time of seeds 31 and 32; the study reports on seed 202. FAST_OFF, FAST_ON, FAST_LEAVES and
+ * FAST_GROWN_ENERGY on palms and creep of hands in time, seeds 5 and 6, with palms of seed 47 in
+ * view. Some stand as in the prototypes, or were chosen once, and were not varied. Check: eitskin
+ * study fast-path */
 
 /* the greatest number of rows in a drive [rows]. larger: more memory; smaller: no skins with 32
  * electrodes */
@@ -312,6 +314,15 @@
 /* a soft disc that ends at this radius or further out is a palm [mm]. between FAST_RHO_WIDE_MM and
  * FAST_RHO_WIDER_MM */
 #define EITS_FAST_PALM_MM R(25.0)
+
+/* if a touch grew by more while a frame was scanned that drives do not explain, and the frame has
+ * several touches about it, the frame shows the drives' touches [of its strength]. larger: a palm
+ * that lands is several discs; smaller: fingers that land together come late */
+#define EITS_FAST_GROWN R(0.3)
+
+/* and if the chi^2 that it explains exceeds what is left of each drive by this factor. larger: as
+ * FAST_GROWN; smaller: at 40 dB touches come late */
+#define EITS_FAST_GROWN_ENERGY R(5.0)
 
 /* a frame's touch with a greater radius is a palm [mm]. larger: a small palm is followed as a
  * finger; smaller: two fingers become a palm */

@@ -42,6 +42,9 @@ typedef struct fast_sight {
  * elsewhere. */
 typedef enum fast_last { FAST_NOT_SEEN, FAST_AGREED, FAST_ELSEWHERE } fast_last;
 
+/* What may make a frame worse than what drives follow. */
+enum { FAST_CHANGED = 1, FAST_GROWS = 2 };
+
 /* A tracked touch: its numbers beside those in the state. */
 typedef struct fast_known {
     uint32_t id;
@@ -111,8 +114,8 @@ struct eits_fast {
     uint32_t drive_count;
     uint32_t unexplained, newsy; /* a bit for each of the last 32 drives */
     uint32_t unexplained_frames, frame_explained;
-    uint32_t smeared;    /* 1: a touch moved or changed in the last frame, and the frame was
-                            not aligned */
+    uint32_t smeared;    /* FAST_CHANGED: a touch moved or changed in the last frame, and the frame
+                            was not aligned; FAST_GROWS: it grew by much, and explains nearly all */
     uint32_t decided;    /* whether the last solved frame alone decided where touches are */
     uint32_t aligned_us; /* time of the last alignment of a frame, and the time between it and the
                             one before */
@@ -351,6 +354,10 @@ uint32_t eits_fast_whole_palm(const eits_fast *fast, const eits_touch *found,
  * explain the frame. 0: none. */
 uint32_t eits_fast_between(const eits_fast *fast, const eits_real (*places)[2], uint32_t count,
                            const eits_real *found);
+/* Return 1 if what the solver found is no better known than what drives follow: a touch grew, fell
+ * or moved while the frame was scanned, and the frame could not be aligned. A palm that lands is
+ * found as several discs then. */
+int eits_fast_is_smeared(const eits_fast *fast, const eits_touch *found, uint32_t count);
 /* When drives begin again: let them find the touches that they followed before. */
 void eits_fast_expect_again(eits_fast *fast);
 /* Return the id of a touch that starts at `place`. */

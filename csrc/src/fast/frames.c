@@ -54,6 +54,16 @@ static int has_moved(const eits_fast *fast, uint32_t k, uint32_t *perhaps)
     return square > far * far || change > much;
 }
 
+/* Return 1 if touch k grew by much since any of the drives, and explains far more of them than what
+ * is left. */
+static int has_grown(const eits_fast *fast, uint32_t k)
+{
+    eits_real square, change;
+    went(fast, k, &square, &change);
+    return change > EITS_FAST_GROWN * fast->state[FAST_SIZE * k + FAST_C] &&
+           fast->known[k].energy > EITS_FAST_GROWN_ENERGY * fast->news;
+}
+
 static void align_touch(eits_fast *fast, uint32_t k, eits_real *aligned)
 {
     const eits_real *now = fast->state + FAST_SIZE * k;
@@ -114,6 +124,7 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
     for (uint32_t n = 0; n < fast->drives; ++n)
         explained &= fast->drive[n].explained;
     const int at_once = fast->news < EITS_FAST_LITTLE_NEWS || fast->faulty;
+    int grows = 0;
     fast->n_off = fast->smeared = 0;
     for (uint32_t k = 0; k < fast->count; ++k) {
         /* Tracks that do not explain the drives cannot bring them to one instant. */
@@ -121,7 +132,9 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
         if (has_moved(fast, k, &perhaps) && explained)
             align_touch(fast, k, aligned);
         fast->stirred |= perhaps;
-        fast->smeared |= perhaps && !explained && !at_once;
+        if (perhaps && !explained && !at_once)
+            fast->smeared = FAST_CHANGED;
+        grows |= has_grown(fast, k);
         fast->stirred |= !fast->known[k].on;
         fast->known[k].aligned = 1;
         eits_copy(fast->known[k].at, fast->state + FAST_SIZE * k, 2);
@@ -131,6 +144,8 @@ eits_status eits_fast_align(eits_fast *fast, const eits_real *volts, size_t leng
             eits_place_on_skin(fast->ctx, fast->off_at[fast->n_off++]);
         }
     }
+    if (grows && !explained && at_once && !fast->faulty)
+        fast->smeared = FAST_GROWS;
     fast->frame_explained = (uint32_t)explained;
     fast->unexplained_frames = explained ? 0 : fast->unexplained_frames + 1;
     fast->stirred |= !explained;
@@ -360,13 +375,14 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
     for (uint32_t k = 0; k < fast->count; ++k)
         decides |= take_back(fast, k, found, (const eits_real(*)[2])at, count);
     match(fast, found, (const eits_real(*)[2])at, count, owner);
+    const int smeared = fast->smeared == FAST_GROWS && eits_fast_is_smeared(fast, found, count);
     uint32_t seen = 0;
     eits_real places[EITS_FAST_MAX_TOUCHES][2];
     for (uint32_t k = 0; k < fast->count; ++k)
         eits_copy(places[k],
                   fast->known[k].aligned ? fast->known[k].at : fast->state + FAST_SIZE * k, 2);
     for (uint32_t n = 0; n < count; ++n) {
-        if (owner[n] == FAST_NONE)
+        if (owner[n] == FAST_NONE || smeared)
             continue;
         const uint32_t between =
             eits_fast_between(fast, (const eits_real(*)[2])places, fast->count, at[n]);
@@ -378,7 +394,7 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
     }
     for (uint32_t k = fast->count; k-- > 0;) {
         fast_known *known = &fast->known[k];
-        if (!known->aligned || (seen >> k & 1u) != 0 || !known->on)
+        if (!known->aligned || (seen >> k & 1u) != 0 || !known->on || smeared)
             continue;
         known->last = FAST_NOT_SEEN;
         if (++known->frames_missed >= EITS_FAST_LOST_FRAMES ||
@@ -388,7 +404,8 @@ eits_status eits_fast_confirm(eits_fast *fast, const eits_touch *found, uint32_t
     for (uint32_t k = 0; k < fast->count; ++k)
         fast->known[k].aligned = 0;
     /* a frame with rows that are no touch's may show any */
-    seed(fast, found, (const eits_real(*)[2])at, owner, fast->wild == 0 ? count : 0, decides);
+    seed(fast, found, (const eits_real(*)[2])at, owner, fast->wild == 0 && !smeared ? count : 0,
+         decides);
     fast->wild = 0;
     fast->decided = (uint32_t)eits_fast_decides(fast);
     return EITS_OK;

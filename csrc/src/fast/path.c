@@ -352,8 +352,15 @@ static void speed_up(eits_fast *fast, uint32_t k, const eits_real *then)
  * found as a new touch. If the signal has not faded when the peak is forgotten, a finger presses
  * lightly. A touch that no frame has shown, or that was hardly there, may have been a wrong place.
  */
-static int leaves_rest(const eits_fast *fast, const fast_known *known)
+static int leaves_rest(const eits_fast *fast, uint32_t k)
 {
+    const fast_known *known = &fast->known[k];
+    for (uint32_t n = 0; n < fast->count; ++n) {
+        if (n != k && fast_is_palm(fast->known[n].rho2) &&
+            fast_distance2(fast->state + FAST_SIZE * n, fast->state + FAST_SIZE * k) <
+                fast_square(fast_room_mm(fast, n)))
+            return 0;
+    }
     return known->confirmed && known->age >= EITS_FAST_LEAVES && known->energy >= EITS_FAST_FAINT &&
            fast->count < EITS_FAST_MAX_TOUCHES;
 }
@@ -378,7 +385,7 @@ static void update_known(eits_fast *fast, const fast_drive *d, uint32_t there)
         slow_down(fast, k, (there >> k & 1u) != 0 ? d->then[k] : NULL);
         if (!known->moving && known->on && (there >> k & 1u) != 0)
             speed_up(fast, k, d->then[k]);
-        const int gone = known->off_drives > EITS_FAST_GONE && !leaves_rest(fast, known);
+        const int gone = known->off_drives > EITS_FAST_GONE && !leaves_rest(fast, k);
         if (gone || !eits_fast_on_skin(fast, state, known->rho2) ||
             !eits_all_finite(state, FAST_SIZE))
             eits_fast_drop(fast, k);

@@ -455,12 +455,27 @@ static int is_rest(const eits_fast *fast, const eits_touch *found)
     return 0;
 }
 
-/* Whether what the solver found is no better known than what drives follow: a touch grew, fell or
- * moved while the frame was scanned, and the frame could not be aligned. A palm that lands is found
- * as several discs then. */
-static int is_smeared(const eits_fast *fast, const eits_touch *found, uint32_t count)
+/* Return 1 if the solver found two touches or more within a palm's reach of one that drives follow.
+ */
+static int is_several(const eits_fast *fast, const eits_touch *found, uint32_t count)
 {
-    int smeared = fast->smeared && !eits_fast_decides(fast);
+    const eits_real room2 = fast_square(fast_room_of_mm(fast, FAST_PALM_MM2));
+    uint32_t most = 0;
+    for (uint32_t k = 0; k < fast->n_followed; ++k) {
+        const eits_real place[2] = {fast->followed[k].x_mm, fast->followed[k].y_mm};
+        uint32_t near = 0;
+        for (uint32_t n = 0; n < count; ++n)
+            near +=
+                fast_distance2(place, (const eits_real[2]){found[n].x_mm, found[n].y_mm}) < room2;
+        most = near > most ? near : most;
+    }
+    return most > 1;
+}
+
+int eits_fast_is_smeared(const eits_fast *fast, const eits_touch *found, uint32_t count)
+{
+    int smeared = fast->smeared && !eits_fast_decides(fast) &&
+                  (fast->smeared != FAST_GROWS || is_several(fast, found, count));
     for (uint32_t n = 0; n < count; ++n)
         smeared &= !fast_is_whole_palm(fast, &found[n]);
     return smeared;
@@ -477,7 +492,7 @@ eits_status eits_fast_report(eits_fast *fast, const eits_touch *found, uint32_t 
         return EITS_E_ARGUMENT;
     const int drives = fast->aligned != 0;
     fast->aligned = *count = 0;
-    const int smeared = drives && is_smeared(fast, found, n_found);
+    const int smeared = drives && eits_fast_is_smeared(fast, found, n_found);
     uint32_t followed = 0;
     if (drives) {
         forget_followed(fast);
