@@ -354,11 +354,14 @@ static uint32_t report_followed(const eits_fast *fast, const eits_touch *found, 
             continue;
         const int agrees =
             n < count && fast_distance2(at[n], place) < fast_square(EITS_FAST_AGREE_MM);
-        /* where the two differ, the frame's place is the better one; but of a palm it has discs */
+        /* where the two differ, the frame's place is the better one; but of a palm it has discs,
+         * and of a touch that slides a place between those that it had during the scan */
         const int palm = fast_is_palm(fast_square(EITS_FAST_SOFT_RADIUS * t->radius_mm));
         const int between = n < count && eits_fast_between(fast, (const eits_real(*)[2])followed,
                                                            fast->n_followed, at[n]) != 0;
-        const int shown = !smeared && (agrees || (n < count && !palm && !between));
+        const eits_real speed2 = fast_square(t->vx_mm_per_s) + fast_square(t->vy_mm_per_s);
+        const int slides = fast->frame_explained && speed2 > fast_square(EITS_FAST_SLIDES);
+        const int shown = !smeared && (agrees || (n < count && !palm && !between && !slides));
         eits_touch *touch = &touches[reported++];
         *touch = shown ? found[n] : alone(fast, t);
         if (shown)
