@@ -154,6 +154,16 @@ TEST(a_tap_is_reported_in_the_first_frame_without_it)
     ENDS("down, up, tap");
 }
 
+TEST(a_light_tap_of_two_frames_is_a_tap)
+{
+    eits_touch light = touch(1, 5, 5);
+    light.explained = (eits_real)0.2;
+    begin();
+    frame(&light, 1);
+    frame(&light, 1);
+    ENDS("down, up, tap");
+}
+
 TEST(two_taps_soon_and_near_are_a_double_tap_and_a_third_is_a_first)
 {
     begin();
@@ -218,6 +228,15 @@ TEST(what_ends_at_rest_or_comes_back_is_no_swipe)
     }
 }
 
+TEST(the_noise_of_a_place_at_rest_is_no_swipe)
+{
+    begin();
+    finger(1, 0, 0, 6, 0, 10);
+    finger(1, 54, 0, 0, 0, 7);
+    finger(1, 60, 0, 0, 0, 1);
+    ENDS("down, up");
+}
+
 /* ---- two fingers ---- */
 
 /* Along the x axis, each so far from the middle at first, by so much a frame. */
@@ -240,6 +259,26 @@ TEST(two_fingers_pinch_and_the_end_says_by_how_much)
     CHECK_EQUAL(end->second_id, 2);
     CHECK_NEAR(end->value, 24.0 / 96.0, 1e-5); /* of the second frame's distance */
     CHECK_NEAR(end->x_mm, 0, 1e-5);
+}
+
+TEST(fingers_at_uncertain_places_must_move_further)
+{
+    static const struct {
+        double variance_mm2, by;
+        const char *reported;
+    } cases[] = {
+        {0, 10, "2 down, pinch begins"}, {25, 10, "2 down"}, {25, 14, "2 down, pinch begins"}};
+    for (size_t k = 0; IN_TABLE(k, cases); ++k) {
+        begin();
+        for (int n = 0; n < 8; ++n) {
+            const double x = n < 4 ? 50 : 50 - cases[k].by;
+            eits_touch two[] = {touch(1, -x, 0), touch(2, x, 0)};
+            for (int f = 0; f < 2; ++f)
+                two[f].x_variance_mm2 = two[f].y_variance_mm2 = (eits_real)cases[k].variance_mm2;
+            frame(two, 2);
+        }
+        REPORTS(cases[k].reported);
+    }
 }
 
 TEST(a_pinch_that_opens_again_becomes_a_spread)
@@ -488,7 +527,7 @@ TEST(a_landing_that_is_renamed_holds_where_it_rests)
     ENDS("2 down, 2 up");
 }
 
-TEST(a_swipe_of_two_frames_counts_the_one_it_lifts_in)
+TEST(a_swipe_of_two_frames_counts_those_it_lands_and_lifts_in)
 {
     begin();
     finger(1, 0, 0, 10, 0, 2);
@@ -496,7 +535,7 @@ TEST(a_swipe_of_two_frames_counts_the_one_it_lifts_in)
                      weak = faint(1, 0, 0, 1, 0.9), far = faint(1, 60, 0, 1, 0.9);
     frame(&going, 1);
     ENDS("down, up, swipe");
-    CHECK_NEAR(last(EITS_EVENT_SWIPE)->value, 22, 1e-5);
+    CHECK_NEAR(last(EITS_EVENT_SWIPE)->value, 32, 1e-5);
     begin(); /* not believed: it lets go of at once what it landed at */
     finger(1, 0, 0, 0, 0, 1);
     frame(&strong, 1);

@@ -38,7 +38,8 @@ typedef struct eits_contact {
     eits_real seen_x_mm, seen_y_mm; /* where it was last found, letting go or not */
     /* strength in S mm2/m, smoothed, without its sign; fraction of the data that it explains */
     eits_real strength, explained;
-    eits_real start_x_mm, start_y_mm;       /* where it landed */
+    eits_real variance_mm2;           /* of its place when it was last found, x and y together */
+    eits_real start_x_mm, start_y_mm; /* where it landed */
     eits_real reported_x_mm, reported_y_mm; /* the place that was last reported */
     eits_real farthest_mm;                  /* its greatest distance from where it landed */
 } eits_contact;
@@ -50,12 +51,13 @@ typedef struct eits_finger_pair {
     uint32_t kind; /* eits_event_kind; 0: nothing yet */
     /* their distance when both were down, and how far they have turned since, counterclockwise */
     eits_real base_mm, turned_deg;
+    eits_real base_mm2;     /* variance of that distance */
     eits_real dx_mm, dy_mm; /* from the first to the second, when both were last seen */
     eits_real extreme_mm;   /* least distance of a pinch, greatest of a spread */
     eits_real reported_mm, reported_deg; /* as last reported */
 } eits_finger_pair;
 
-/* The whole state, 5,540 bytes in float32. It has no pointers, so a copy works on its own. Programs
+/* The whole state, 5,672 bytes in float32. It has no pointers, so a copy works on its own. Programs
  * may read it; only the functions below change it. */
 typedef struct eits_gestures {
     eits_gesture_options options;

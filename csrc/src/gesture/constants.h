@@ -58,7 +58,7 @@
 
 /* a shorter tap must be clear [us]. larger: quick taps are missed; smaller: ghosts of landing
  * fingers tap */
-#define EITS_SHORT_US 30000
+#define EITS_SHORT_US 15000
 
 /* a touch that explains at least this much is clear [of the data]. larger: quick taps are missed;
  * smaller: ghosts tap */
@@ -98,7 +98,7 @@
 
 /* the speed of a swipe is taken over this time [us]. larger: rests are missed; smaller: noise
  * decides */
-#define EITS_SPEED_US 65000
+#define EITS_SPEED_US 130000
 
 /* a swipe ends at least this far from its first place [of the farthest]. larger: arcs are missed;
  * smaller: strokes there and back become swipes */
@@ -107,6 +107,10 @@
 /* two fingers pinch, spread or turn once they have moved this far in total [mm]. larger: small ones
  * are missed; smaller: fingers that rest wobble */
 #define EITS_PAIR_MM R(15.0)
+
+/* and further by this part of the variance of their places, of then and now, added as squares.
+ * larger: gestures of light fingers are missed; smaller: noise makes gestures */
+#define EITS_PAIR_NOISE R(2.0)
 
 /* ---- Chosen: by hand, a matter of taste: MOVE_MM and ZONE_STAY_MM say how finely a finger is
  * reported. The others are guards; none changes a gesture at half and at double (study constants).

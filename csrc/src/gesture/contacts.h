@@ -17,8 +17,7 @@ enum {
     CONTACT_TAPPED = 8,   /* its tap was reported, before it was found again */
     CONTACT_DUBIOUS = 16, /* it must last doubt_us to be reported */
     CONTACT_GOING = 32,   /* it was lifting when it was last found */
-    CONTACT_RENAMED = 64, /* in this frame it took another touch's place */
-    CONTACT_VAGUE = 128   /* its place was uncertain when it was last found */
+    CONTACT_RENAMED = 64  /* in this frame it took another touch's place */
 };
 
 /* The list that takes the events of a frame. */

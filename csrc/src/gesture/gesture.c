@@ -146,9 +146,7 @@ static void note_place(const eits_gestures *g, eits_contact *c, const eits_touch
         const int going = !firm || touch->explained < EITS_GOING * c->explained;
         c->flags = going ? c->flags | CONTACT_GOING : c->flags & ~(uint32_t)CONTACT_GOING;
         c->explained = touch->explained;
-        const int vague =
-            touch->x_variance_mm2 + touch->y_variance_mm2 > EITS_VAGUE_MM * EITS_VAGUE_MM;
-        c->flags = vague ? c->flags | CONTACT_VAGUE : c->flags & ~(uint32_t)CONTACT_VAGUE;
+        c->variance_mm2 = touch->x_variance_mm2 + touch->y_variance_mm2;
     } else if (!firm || ((c->flags & CONTACT_GOING) != 0 && is_held(c, touch))) {
         return; /* it was lifting, and no frame shows it any more: it has lifted */
     }
@@ -320,6 +318,7 @@ static int is_renamed(eits_gestures *g, eits_contact *c)
                                   .x_mm = other->x_mm,
                                   .y_mm = other->y_mm,
                                   .strength_s_per_m_mm2 = other->strength,
+                                  .x_variance_mm2 = other->variance_mm2,
                                   .explained = other->explained};
         note_place(g, c, &touch);
         c->flags |= CONTACT_RENAMED;
@@ -327,8 +326,8 @@ static int is_renamed(eits_gestures *g, eits_contact *c)
         if (g->time_us - c->born_us > 2 * g->options.doubt_us || (c->flags & CONTACT_GOING) != 0)
             return 1;
         /* the finger has just landed, and its first touch was false */
-        c->start_x_mm = c->x_mm;
-        c->start_y_mm = c->y_mm;
+        c->start_x_mm = c->trail_x_mm[0] = c->x_mm;
+        c->start_y_mm = c->trail_y_mm[0] = c->y_mm;
         c->farthest_mm = 0;
         return 1;
     }
@@ -345,7 +344,8 @@ static void end_lost(eits_gestures *g, event_list *out)
         /* noise hides a finger whose place is uncertain in single frames: it has time to come back
          */
         const uint32_t lost_us =
-            g->options.lost_us * ((c->flags & CONTACT_VAGUE) != 0 ? EITS_VAGUE_LOST : 1u);
+            g->options.lost_us *
+            (c->variance_mm2 > EITS_VAGUE_MM * EITS_VAGUE_MM ? EITS_VAGUE_LOST : 1u);
         if ((c->flags & CONTACT_SEEN) != 0 || (c->state == CONTACT_DOWN && is_renamed(g, c)))
             continue;
         if (c->state == CONTACT_DOWN && since_us >= lost_us) {

@@ -70,16 +70,24 @@ static int is_swipe(const eits_gestures *g, eits_contact *c, eits_real dx, eits_
     return 1;
 }
 
+/* Returns the way of a finger from where the first frame showed it to where the last one did, if it
+ * was there no longer than a tap; else 0. */
+static eits_real quick_way(const eits_gestures *g, const eits_contact *c)
+{
+    if (c->trail_count > EITS_TRAIL || c->seen_us - c->born_us > g->options.tap_us)
+        return 0;
+    return eits_distance(c->seen_x_mm - c->trail_x_mm[0], c->seen_y_mm - c->trail_y_mm[0]);
+}
+
 /* Report a swipe. A quick swipe is over before three frames show it; then the frame in which the
- * finger lifts counts, too. */
+ * finger landed counts, and that in which it lifts. */
 static void swipe(const eits_gestures *g, eits_contact *c, event_list *out)
 {
-    const uint32_t last_us = c->trail_us[(c->trail_count - 1) % EITS_TRAIL];
-    const eits_real going_mm = eits_distance(c->seen_x_mm - c->x_mm, c->seen_y_mm - c->y_mm);
+    const eits_real way_mm = quick_way(g, c);
     if (!is_swipe(g, c, c->x_mm - c->start_x_mm, c->y_mm - c->start_y_mm, last_speed(g, c), out) &&
-        c->seen_us != last_us && c->seen_us - c->born_us <= g->options.tap_us)
-        (void)is_swipe(g, c, c->seen_x_mm - c->start_x_mm, c->seen_y_mm - c->start_y_mm,
-                       going_mm / ((eits_real)(c->seen_us - last_us) * R(1e-6)), out);
+        way_mm > 2 * g->options.still_mm && c->seen_us != c->trail_us[0])
+        (void)is_swipe(g, c, c->seen_x_mm - c->trail_x_mm[0], c->seen_y_mm - c->trail_y_mm[0],
+                       way_mm / ((eits_real)(c->seen_us - c->trail_us[0]) * R(1e-6)), out);
 }
 
 /* Returns 1 if another finger came no later and stayed at least as long: then this one is not
@@ -99,12 +107,10 @@ static int is_outlived(const eits_gestures *g, const eits_contact *c)
 void eits_lifted(eits_gestures *g, eits_contact *c, event_list *out)
 {
     const uint32_t lasted_us = c->seen_us - c->born_us;
-    const eits_real going_mm =
-        eits_distance(c->seen_x_mm - c->start_x_mm, c->seen_y_mm - c->start_y_mm);
     if (is_outlived(g, c))
         return;
     if ((c->flags & (CONTACT_WITH | CONTACT_DONE | CONTACT_TAPPED)) == 0 &&
-        c->farthest_mm <= g->options.still_mm && going_mm <= 2 * g->options.still_mm &&
+        c->farthest_mm <= g->options.still_mm && quick_way(g, c) <= 2 * g->options.still_mm &&
         (lasted_us >= g->options.short_us || c->explained >= g->options.clear) &&
         lasted_us <= g->options.tap_us)
         tap(g, c, out);

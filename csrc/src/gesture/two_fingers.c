@@ -64,6 +64,7 @@ static void look_for_pair(eits_gestures *g)
                                  .first_id = first->id,
                                  .second_id = second->id,
                                  .base_mm = apart,
+                                 .base_mm2 = first->variance_mm2 + second->variance_mm2,
                                  .dx_mm = dx,
                                  .dy_mm = dy,
                                  .extreme_mm = apart};
@@ -86,14 +87,25 @@ static eits_real way_round(eits_real degrees, eits_real apart_mm)
     return eits_fabs(degrees) * R(0.017453292519943295) * apart_mm;
 }
 
+/* Returns how far two fingers must have moved, so that their uncertain places alone do not make a
+ * gesture. */
+static eits_real least_way(const eits_gestures *g)
+{
+    const eits_finger_pair *p = &g->pair;
+    const eits_real variance_mm2 =
+        p->base_mm2 + g->contact[p->first].variance_mm2 + g->contact[p->second].variance_mm2;
+    return eits_sqrt(g->options.pair_mm * g->options.pair_mm + EITS_PAIR_NOISE * variance_mm2);
+}
+
 /* Both ways are compared in mm, so that one threshold serves: in degrees, noise alone would turn
  * fingers that are near each other. */
 static void recognise(eits_gestures *g, eits_real apart_mm, event_list *out)
 {
     const eits_finger_pair *p = &g->pair;
+    const eits_real least_mm = least_way(g);
     const eits_real along = eits_fabs(apart_mm - p->base_mm);
     const eits_real round = way_round(p->turned_deg, apart_mm);
-    if (along < g->options.pair_mm && round < g->options.pair_mm)
+    if (along < least_mm && round < least_mm)
         return;
     begin_kind(g,
                round > along           ? EITS_EVENT_ROTATE
@@ -109,7 +121,7 @@ static void go_on(eits_gestures *g, eits_real apart_mm, event_list *out)
     /* the way back is measured from the farthest point, not from the start: a wide pinch may open a
      * little and still be a pinch */
     const eits_real back = pinch ? apart_mm - p->extreme_mm : p->extreme_mm - apart_mm;
-    if (!rotate && back >= g->options.pair_mm) {
+    if (!rotate && back >= least_way(g)) {
         report_pair(g, EITS_PHASE_END, out);
         /* the new gesture's value begins at 1 where it turned round */
         p->base_mm = p->extreme_mm;
