@@ -206,33 +206,25 @@ TEST(the_covariance_of_the_rows_left_is_theirs)
     }
 }
 
-/* Re or Im of E_drive E_measure, E averaged over the disc's cover, times -volts change area. */
+/* Re or Im of E_drive E_measure, E the small model's fields at the disc's middle, times -volts
+ * change area. */
 static void dipole_answer(const bench *b, const eits_disc *disc, int part, double *out)
 {
     const eits_model *m = &b->b.c.model;
-    const double pixel = (double)m->pixel_mm, pi = 3.14159265358979323846;
-    double complex field[SMALL_ELECTRODES] = {0};
-    double whole = 0;
-    for (uint32_t j = 0; j < m->n_pixels; ++j) {
-        const double dx =
-            (double)m->origin_x_mm + (m->pixel[j].ix + 0.5) * pixel - (double)disc->x_mm;
-        const double dy =
-            (double)m->origin_y_mm + (m->pixel[j].iy + 0.5) * pixel - (double)disc->y_mm;
-        const double cover =
-            fmin(1, fmax(0, 0.5 + ((double)disc->radius_mm - hypot(dx, dy)) / pixel));
-        whole += cover;
-        for (uint32_t e = 0; e < SMALL_ELECTRODES; ++e)
-            field[e] += cover * (dense_entry(&m->fields.at, j, e) +
-                                 I * dense_entry(&m->fields.at, j, SMALL_ELECTRODES + e));
-    }
+    const double pixel = (double)m->pixel_mm, pi = 3.14159265358979323846,
+                 rim = 0.75 * SIDE * pixel;
+    const double complex middle = (double)disc->x_mm + I * (double)disc->y_mm;
+    double complex field[SMALL_ELECTRODES];
+    for (int e = 0; e < SMALL_ELECTRODES; ++e)
+        field[e] = rim / 20 / conj(middle - rim * cexp(2 * pi * I * e / SMALL_ELECTRODES));
     const double radius = (double)disc->radius_mm,
                  moment = (double)disc->change * pi * (radius * radius + pixel * pixel / 12);
     memset(out, 0, RANK * sizeof *out);
     for (uint32_t k = 0; k < SMALL_FOLDED; ++k) {
         const uint8_t *row = m->protocol + 4 * (size_t)m->fold[k].first;
-        const double complex answer = (field[row[0]] - field[row[1]]) / whole *
-                                      (field[row[2]] - field[row[3]]) / whole *
-                                      -(double)m->fields.volts * moment;
+        const double complex answer = (field[row[0]] - field[row[1]]) *
+                                      (field[row[2]] - field[row[3]]) * -(double)m->fields.volts *
+                                      moment;
         for (int i = 0; i < RANK; ++i)
             out[i] += b->b.d.p[k * RANK + (uint32_t)i] * (part ? cimag(answer) : creal(answer));
     }
@@ -275,8 +267,9 @@ TEST(shapes_move_the_data_as_ellipses_do)
         const double size = sqrt(dense_dot(expected[p], expected[p], RANK)),
                      part = p == 0 ? 1 : (p < 4 ? 0 : (double)answer.shape[0][p - 4]);
         CHECK(size > 0);
+        /* dipoles to what halves and a polynomial make of the fields */
         CHECK_NEAR(dense_greatest_difference(expected[p], ctx->evidence.column + STRIDE * p, RANK),
-                   0, BOTH_WIDTHS(1e-3, 1e-6) * size);
+                   0, (p < EITS_EDGE_PARAMETERS ? BOTH_WIDTHS(1e-3, 1e-6) : 2e-3) * size);
         for (int i = 0; i < RANK; ++i)
             left[i] -= part * (double)ctx->evidence.column[STRIDE * p + i];
     }
@@ -285,18 +278,13 @@ TEST(shapes_move_the_data_as_ellipses_do)
 }
 
 /* A disc has eight parameters if there is room, otherwise four, otherwise none; it has dipoles if
- * the model has fields and if there is room for its dipoles. */
+ * the model has fields. */
 TEST(parameters_fit_the_data)
 {
     eits_context *ctx = set_up(&b, 0);
     const uint32_t expected[] = {8, 8, 8, 4, 4, 4, 0};
     for (uint32_t count = 0; count < 7; ++count)
         CHECK_EQUAL(eits_shape_parameters(ctx, count), expected[count]);
-    b.b.c.model.fields.at.stride = b.b.c.model.n_pixels + 8;
-    CHECK_EQUAL(eits_shape_parameters(ctx, 1), 6);
-    CHECK_EQUAL(eits_shape_parameters(ctx, 3), 6);
-    b.b.c.model.fields.at.stride = b.b.c.model.n_pixels;
-    CHECK_EQUAL(eits_shape_parameters(ctx, 1), 8);
     b.b.c.model.data_kind = EITS_DATA_NORMALISED;
     CHECK_EQUAL(eits_shape_parameters(ctx, 1), 6);
 }

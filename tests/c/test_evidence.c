@@ -403,7 +403,8 @@ TEST(zeros_and_nan_come_to_an_end)
 {
     for (int way = 0; way < 3; ++way) {
         eits_context *ctx = set_up(&b, way == 1);
-        const eits_disc discs[2] = {ONE, OTHER};
+        eits_disc discs[2] = {ONE, OTHER};
+        discs[0].change *= R(0.1), discs[1].change *= R(0.1); /* beyond it F is rounding */
         double y[RANK] = {0};
         stage(&b, y);
         if (way == 2)

@@ -65,6 +65,7 @@ static void fit_and_test(eits_context *ctx, const eits_scratch *scratch, eits_fi
 {
     eits_joint j;
     ctx->evidence.spent = 0; /* where no test is needed */
+    eits_pole_forget(ctx);
     const int clear = fit(ctx, scratch, f, &j);
     if (!clear) {
         note_unexplained(ctx, f);

@@ -12,6 +12,7 @@
 #include "evidence/evidence.h"
 
 #include "base/vec.h"
+#include "context/places.h"
 #include "evidence/constants.h"
 #include "frame/fold.h"
 #include "kernels/kernels.h"
@@ -23,11 +24,7 @@ uint32_t eits_shape_parameters(const eits_context *ctx, uint32_t count)
 {
     const uint32_t room =
         ctx->model->rank < EITS_EVIDENCE_COLUMNS ? ctx->model->rank : EITS_EVIDENCE_COLUMNS;
-    const eits_matrix *fields = &ctx->model->fields.at;
-    /* a disc's fields are kept in scratch->pixel[0] */
-    const int dipoles = fields->data != NULL && ctx->model->data_kind == EITS_DATA_DIFFERENCE &&
-                        fields->stride <= ctx->model->n_pixels;
-    const uint32_t all = dipoles ? EITS_SHAPE_PARAMETERS : EITS_EDGE_PARAMETERS;
+    const uint32_t all = eits_has_poles(ctx) ? EITS_SHAPE_PARAMETERS : EITS_EDGE_PARAMETERS;
     if (count * all <= room && count * all <= EITS_SHAPE_COLUMNS)
         return all;
     return count * EITS_PLACE_PARAMETERS <= room ? EITS_PLACE_PARAMETERS : 0;
@@ -48,25 +45,34 @@ void eits_leave_out(eits_answer *answer, uint32_t k)
     memmove(&answer->shape[k], &answer->shape[k + 1u], after * sizeof answer->shape[k]);
 }
 
-/* The disc's answer as a dipole that is stronger along one axis: part[0] of the real part and
- * part[1] of the imaginary part. The disc's fields are in scratch->pixel[0]. */
-static uint64_t dipole(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
-                       const eits_real part[2], eits_real *out)
+/* Let slot k of the multipole model hold the electrodes' fields about disc k. */
+static uint64_t take_fields(eits_context *ctx, uint32_t k, const eits_disc *disc)
+{
+    const eits_shape shape = eits_disc_as_shape(ctx, disc);
+    return eits_pole_home(ctx, k, &shape);
+}
+
+/* The answer of disc k as a dipole that is stronger along one axis: part[0] of the real part of the
+ * product of both fields, and part[1] of the imaginary part. */
+static uint64_t dipole(eits_context *ctx, const eits_scratch *scratch, uint32_t k,
+                       const eits_disc *disc, const eits_real part[2], eits_real *out)
 {
     const uint32_t electrodes = ctx->model->n_electrodes, folds = ctx->model->n_folded;
-    const eits_real *field = scratch->pixel[0],
-                    factor = -((eits_real)ctx->model->fields.volts * eits_disc_moment(ctx, disc)),
+    const eits_real *field = ctx->multipole.own + EITS_POLE_FIELD(electrodes) * k; /* E_x - i E_y */
+    const eits_real pi = R(3.14159265358979323846), pixel = (eits_real)ctx->model->pixel_mm,
+                    area = pi * eits_fma(disc->radius_mm, disc->radius_mm, pixel * pixel / 12),
+                    factor = -((eits_real)ctx->model->fields.volts * disc->change * area),
                     re = factor * part[0], im = factor * part[1];
     uint32_t count = 0;
-    for (uint32_t k = 0; k < folds; ++k) {
-        const uint8_t *row = eits_row(ctx, ctx->model->fold[k].first);
+    for (uint32_t f = 0; f < folds; ++f) {
+        const uint8_t *row = eits_row(ctx, ctx->model->fold[f].first);
         const eits_real x = field[row[0]] - field[row[1]],
-                        y = field[electrodes + row[0]] - field[electrodes + row[1]];
+                        y = field[electrodes + row[1]] - field[electrodes + row[0]];
         const eits_real u = field[row[2]] - field[row[3]],
-                        v = field[electrodes + row[2]] - field[electrodes + row[3]];
-        scratch->index[count] = k;
+                        v = field[electrodes + row[3]] - field[electrodes + row[2]];
+        scratch->index[count] = f;
         scratch->value[count] = eits_fma(re, eits_fma(x, u, -(y * v)), im * eits_fma(x, v, y * u));
-        count += ctx->frame.sides[k] != EITS_SIDE_NONE;
+        count += ctx->frame.sides[f] != EITS_SIDE_NONE;
     }
     return 6u * folds + eits_reduce(ctx, scratch, count, out);
 }
@@ -96,9 +102,9 @@ uint64_t eits_shape_columns(eits_context *ctx, const eits_scratch *scratch,
     }
     if (parameters == EITS_SHAPE_PARAMETERS) {
         static const eits_real re[2] = {1, 0}, im[2] = {0, 1};
-        macs += eits_disc_field(ctx, scratch, disc, scratch->pixel[0]);
-        macs += dipole(ctx, scratch, disc, re, column[6]);
-        macs += dipole(ctx, scratch, disc, im, column[7]);
+        macs += take_fields(ctx, k, disc);
+        macs += dipole(ctx, scratch, k, disc, re, column[6]);
+        macs += dipole(ctx, scratch, k, disc, im, column[7]);
     }
     for (uint32_t p = 0; p < parameters; ++p) {
         macs += eits_whiten_errors(ctx, column[p]);
@@ -124,8 +130,8 @@ uint64_t eits_shape_residual(eits_context *ctx, const eits_scratch *scratch,
         eits_axpy(ctx->kernels, whole, disc->change, one, rank);
         if (answer->parameters < EITS_SHAPE_PARAMETERS || (shape[2] == 0 && shape[3] == 0))
             continue;
-        macs += eits_disc_field(ctx, scratch, disc, scratch->pixel[0]);
-        macs += dipole(ctx, scratch, disc, &shape[2], one);
+        macs += take_fields(ctx, k, disc);
+        macs += dipole(ctx, scratch, k, disc, &shape[2], one);
         eits_axpy(ctx->kernels, whole, 1, one, rank);
     }
     macs += eits_whiten_errors(ctx, whole);

@@ -206,7 +206,8 @@
  * search [drives]. larger: more memory; smaller: long searches begin again */
 #define EITS_FAST_RING 14
 
-/* touches nearer than the root of this do not change each other's field [mm^2]. as NO_DIPOLE_MM2 */
+/* touches nearer than the root of this do not change each other's field [mm^2]. larger: near
+ * touches lose their interaction; smaller: the field is infinite */
 #define EITS_FAST_NO_DIPOLE_MM2 R(1e-06)
 
 /* the model's error in each row, as far as it is not learned [of a touch's answer]. larger: touches

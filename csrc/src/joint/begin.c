@@ -2,16 +2,12 @@
 #include "context/places.h"
 #include "joint/constants.h"
 #include "joint/joint.h"
+#include "touch/interaction.h"
 
 /* A disc as a touch that is not light. */
 static eits_shape shape_of(const eits_context *ctx, const eits_disc *d)
 {
-    const eits_model *model = ctx->model;
-    const eits_real pixel = (eits_real)model->pixel_mm;
-    const eits_shape found = {.x = (d->x_mm - (eits_real)model->origin_x_mm) / pixel,
-                              .y = (d->y_mm - (eits_real)model->origin_y_mm) / pixel,
-                              .radius = d->radius_mm / pixel,
-                              .amplitude = d->change / eits_pole_sheet(model)};
+    const eits_shape found = eits_disc_as_shape(ctx, d);
     return eits_joint_as_strong(&found);
 }
 
@@ -94,7 +90,6 @@ void eits_joint_give(const eits_context *ctx, const eits_joint *j, eits_fit *f)
 int eits_fit_clearly(eits_context *ctx, const eits_scratch *scratch, eits_fit *f, eits_joint *j)
 {
     j->count = 0;
-    eits_pole_forget(ctx);
     if (!may_fit(ctx, f))
         return 0;
     *j = begin(ctx, f);
@@ -155,6 +150,6 @@ void eits_fit_jointly(eits_context *ctx, const eits_scratch *scratch, eits_fit *
     if (!eits_joint_explains(ctx, j) ||
         (f->drifts && eits_joint_excess(ctx, j) > EITS_JOINT_FITTED))
         return;
-    f->macs += eits_joint_evaluate(ctx, j, 1);
+    f->macs += eits_joint_return_to(ctx, j); /* the slots hold the discs of the test */
     eits_joint_refine(ctx, j, f);
 }

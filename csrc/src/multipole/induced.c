@@ -235,8 +235,10 @@ uint64_t eits_pole_induced_in(eits_context *ctx, const eits_shape *shape, uint32
             eits_zero(induced, slot);
         }
         for (uint32_t k = 0; k < into_count; ++k) {
-            for (uint32_t j = 0; j < count; ++j)
-                macs += receive(ctx, shape, into[k], j, &rim[j], poles);
+            for (uint32_t j = 0; j < count; ++j) {
+                if (j != into[k] || !poles->of_others)
+                    macs += receive(ctx, shape, into[k], j, &rim[j], poles);
+            }
         }
     }
     return macs + (uint64_t)rounds * electrodes * into_count * 12u * poles->orders;

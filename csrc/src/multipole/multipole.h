@@ -47,7 +47,8 @@ typedef struct eits_shape {
 typedef struct eits_poles {
     uint32_t
         orders; /* orders in the answer: EITS_POLE_DISC_ORDERS for discs, else EITS_POLE_ORDERS */
-    uint32_t sent; /* outgoing orders that reach others: 1 to EITS_POLE_SENT */
+    uint32_t sent;      /* outgoing orders that reach others: 1 to EITS_POLE_SENT */
+    uint32_t of_others; /* 1: a shape gets nothing from its own image in the rim */
 } eits_poles;
 
 /* Return eta of a shape. */

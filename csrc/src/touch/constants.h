@@ -177,8 +177,8 @@
 
 /* ---- Chosen: DAMPING and SETTLED_PIXELS by hand, the others guards. Study constants: at half and
  * at double DAMPING loses no exact frame of 1459 and adds 6 wrong diagnostics at most,
- * STANDS_OUT_NEAR loses 3 at half; the pivots, PARALLEL, NO_DIPOLE_MM2 and NO_DIRECTION change
- * nothing. Check: ctest --preset host -R 'touch_fit|split_merge|disc|interaction' */
+ * STANDS_OUT_NEAR loses 3 at half; the pivots, PARALLEL and NO_DIRECTION change nothing. Check:
+ * ctest --preset host -R 'touch_fit|split_merge|disc|interaction' */
 
 /* damping of a step: it holds a direction that the data do not determine, and shortens the step
  * along others by a thousandth [of the unit diagonal]. larger: slow convergence; smaller: steps
@@ -206,10 +206,6 @@
 /* least determinant of two atoms that can be separated [of the squares]. larger: near discs cannot
  * split; smaller: strengths of rounding */
 #define EITS_PARALLEL R(1e-05)
-
-/* discs nearer than the root of this do not change each other's field [mm^2]. larger: near discs
- * lose their interaction; smaller: the field is infinite */
-#define EITS_NO_DIPOLE_MM2 R(1e-06)
 
 /* at a pixel nearer to a disc's centre than this, the cover has no slope [pixels]. larger: pixels
  * near the centre lose their slope; smaller: divides by rounding */

@@ -192,22 +192,6 @@ uint64_t eits_disc_atom(eits_context *ctx, const eits_scratch *scratch, const ei
     return eits_disc_shape(ctx, scratch, disc, atom, slope, NULL);
 }
 
-/* A weighted mean, so the column weights of S do not enter. A disc that covers nothing has sum 0
- * and no terms. */
-uint64_t eits_disc_field(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
-                         eits_real *field)
-{
-    const eits_matrix *at = &ctx->model->fields.at;
-    const covered c = cover(ctx, scratch, disc);
-    eits_real sum = 0;
-    for (uint32_t k = 0; k < c.count; ++k)
-        sum += c.cover[k];
-    for (uint32_t k = 0; k < c.count; ++k)
-        c.cover[k] /= sum;
-    ctx->kernels->mul(at, c.index, c.cover, c.count, field);
-    return (uint64_t)c.count * at->rows;
-}
-
 eits_real eits_disc_area(const eits_context *ctx, const eits_disc *disc)
 {
     const eits_model *model = ctx->model;

@@ -29,12 +29,6 @@ uint64_t eits_disc_shape(eits_context *ctx, const eits_scratch *scratch, const e
 uint64_t eits_disc_ellipse(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
                            const eits_real edge_mm[2], eits_real *atom);
 
-/* The model's fields (eits_fields), averaged over the disc's covers: `field` has fields.at.stride
- * numbers, zeros where no pixel is covered.
- * Returns the multiply-accumulates. */
-uint64_t eits_disc_field(eits_context *ctx, const eits_scratch *scratch, const eits_disc *disc,
-                         eits_real *field);
-
 /* Return the sum of the disc's covers on the kept pixels, in mm^2: the area with which its change
  * was fitted. On a coarse grid it differs from pi radius^2 by a few per cent from place to place,
  * and near the rim it is only the part on the skin. */

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from eitskin.arrays import ComplexArray, FloatArray
-from eitskin.core.constants_table import NO_DIPOLE_MM2, RADIUS_DEVIATION
+from eitskin.core.constants_table import RADIUS_DEVIATION
 from eitskin.core.diagnostics_table import Touch
 from eitskin.core.results import Options
 from eitskin.fem.grid import Grid
@@ -19,6 +19,7 @@ DERIVATIVE_STEP = 1e-4  # pixels, and of the change
 STARTING_SIZES = (1.0, 0.6, 1.6)  # of the seed's radius
 ITERATIONS = 60
 MORE_THAN_NOISE = 4.0  # directions of noise that a disc must explain: it has as many numbers
+NEAREST_MM2 = 1e-6  # discs nearer than the root of this do not change each other's field
 SETTLED = 1e-5  # a step that gains less of the cost ends a fit
 
 
@@ -294,7 +295,7 @@ def _mean_over(model: Model, disc: Disc) -> FloatArray:
 
 
 def _inverse_square(z: complex) -> complex:
-    return 1 / z**2 if abs(z) ** 2 > NO_DIPOLE_MM2 else 0j
+    return 1 / z**2 if abs(z) ** 2 > NEAREST_MM2 else 0j
 
 
 def on_skin(grid: Grid, x_mm: float, y_mm: float) -> tuple[float, float]:

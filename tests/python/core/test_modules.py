@@ -18,9 +18,9 @@ MODULES = (
     "frame",
     "diagnostics",
     "solve",
+    "multipole",
     "touch",
     "evidence",
-    "multipole",
     "joint",
     "api",
 )
