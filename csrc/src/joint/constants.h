@@ -220,6 +220,11 @@
  * these two [of the expected radius]. any other value needs more steps */
 #define EITS_JOINT_FAR_APART R(1.8)
 
+/* a touch that is found in addition to few others counts if it is farther than this from all of
+ * them [of the expected radius]. larger: a touch between two fingers of a chord stays; smaller: a
+ * finger that lands at the rim becomes two */
+#define EITS_JOINT_FAR_LEAST R(2.5)
+
 /* during a search a disc is removed if F rises by less without it. larger: small touches are
  * removed; smaller: the solver's ripple stays */
 #define EITS_JOINT_NEEDED R(20.0)

@@ -57,6 +57,21 @@ static int may_miss(const eits_context *ctx, const eits_joint *j)
     return (j->count >= EITS_JOINT_CROWD && may_search(ctx, j)) || few_may_miss(ctx, j);
 }
 
+/* Whether of few shapes the last ones, from `count` on, are far from all others. While a finger
+ * lands at the rim, a second shape beside it explains the rows that were measured earlier. */
+static int are_far_apart(const eits_context *ctx, const eits_joint *j, uint32_t count)
+{
+    const eits_real least = EITS_JOINT_FAR_LEAST * eits_joint_usual(ctx, 0, 0, 0).radius;
+    for (uint32_t n = count; n < j->count && count < EITS_JOINT_CROWD; ++n) {
+        for (uint32_t k = 0; k < n; ++k) {
+            const eits_real dx = j->shape[n].x - j->shape[k].x, dy = j->shape[n].y - j->shape[k].y;
+            if (!(eits_fma(dx, dx, dy * dy) > least * least))
+                return 0;
+        }
+    }
+    return 1;
+}
+
 /* Search from `first`, or one of few shapes as two (`apart`); *j becomes what is found, where that
  * fits better, or where a crowd needs fewer touches. Of few, the test says which are none. */
 static void try_search(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
@@ -72,7 +87,8 @@ static void try_search(eits_context *ctx, const eits_scratch *scratch, eits_join
         eits_joint_search(ctx, scratch, &found, macs);
     const int fewer = found.count < j->count && j->count >= EITS_JOINT_CROWD;
     const eits_real fall = fewer ? -EITS_JOINT_NEEDED : EITS_JOINT_SPLIT_FALL;
-    if (j->cost - found.cost > fall * eits_joint_excess(ctx, &found))
+    if (j->cost - found.cost > fall * eits_joint_excess(ctx, &found) &&
+        are_far_apart(ctx, &found, j->count))
         *j = found;
     else
         eits_joint_back(ctx, j);

@@ -146,10 +146,7 @@ class FastCore:
         Raises:
             FrameError: there are more touches than the core can report.
         """
-        names = ("x_mm", "y_mm", "strength_s_per_m_mm2")
-        given = self._ffi.new(
-            "eits_touch[]", [{name: getattr(one, name) for name in names} for one in found] or 1
-        )
+        given = self._ffi.new("eits_touch[]", c_touches(found) or 1)
         self._check(self._lib.eits_fast_confirm(self._state, given, len(found)))
         return self.touches()
 
