@@ -171,6 +171,24 @@ def test_times_of_rows_follow_touches_through_the_scan():
     assert min(touch.id for touch in shown[-1].touches) < 10
 
 
+@pytest.mark.parametrize(("x_mm", "y_mm"), [(-28.0, 15.0), (37.0, -10.0), (0.0, 0.0)])
+def test_a_palm_that_lands_in_a_scan_is_shown_as_the_frame_has_it(x_mm, y_mm):
+    """Drives follow it as a finger first. From frames the tracker learns that it is wide. Before,
+    Python did not pass on radii, and frames had the palm up to 8 mm off, as a finger, for good."""
+    palm = TouchSet("palm", 5, (TouchScene("0", (Put(x_mm, y_mm, 22.0, 2.0),)),))
+    here = simulate(paper_skin(), adjacent(16), palm, measurement=Measurement(snr_db=60.0))
+    core = Reconstructor(prebuilt()[0], engine="c64", blob=prebuilt()[1], options=options())
+    core.tare(here.untouched_v)
+    before, after = here.untouched_v[0], here.frames_v[0]
+    landing = np.where(np.arange(len(after)) < 100, before, after)
+    times = np.arange(len(landing)) * 1e-4
+    frames = [before] * 3 + [landing] + [after] * 11
+    shown = [core.follow(one, times + 0.0208 * k).touches for k, one in enumerate(frames)]
+    for (touch,) in shown[-4:]:
+        assert np.hypot(touch.x_mm - x_mm, touch.y_mm - y_mm) < 1
+        assert touch.radius_mm is not None and abs(touch.radius_mm - 22.0) < 1
+
+
 @pytest.mark.parametrize("fields", [True, False], ids=["one-tare-frame", "no-fields"])
 def test_times_of_rows_need_fields_and_noise(fields):
     """Without them frames are followed as they are."""
