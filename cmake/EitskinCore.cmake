@@ -22,7 +22,7 @@ set(EITSKIN_CORE_SOURCES
     api/setup.c api/access.c api/save.c api/frame_stage.c api/reference.c api/reconstruct.c
     api/touches.c api/batch.c api/draw.c api/self_test.c
     fast/setup.c fast/rows.c fast/bias.c fast/tracks.c fast/map.c fast/ring.c fast/path.c
-    fast/frames.c fast/report.c search/fit.c search/equations.c search/known.c
+    fast/frames.c fast/report.c fast/trust.c search/fit.c search/equations.c search/known.c
     search/births.c search/list.c search/decide.c search/apply.c
     gesture/plane.c gesture/one_finger.c gesture/two_fingers.c gesture/gesture.c gesture/zones.c
     link/link.c)

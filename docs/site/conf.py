@@ -2,6 +2,7 @@
 command line and of the C headers. ``scripts/site`` calls it."""
 
 import re
+import subprocess
 import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
@@ -96,6 +97,8 @@ nb_execution_raise_on_error = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 hawkmoth_root = str(HEADERS)
-hawkmoth_clang = [f"-I{HEADERS}"]
+# libclang has no stddef.h of its own
+compiler_headers = subprocess.check_output(["cc", "-print-file-name=include"], text=True).strip()
+hawkmoth_clang = [f"-I{HEADERS}", f"-I{compiler_headers}"]
 html_theme = "furo"
 html_title = "eitskin"

@@ -336,11 +336,8 @@ void eits_fast_look(const eits_fast *fast, const eits_real *place, eits_real rho
 void eits_fast_add_interplay(const eits_fast *fast, uint32_t drive, const fast_sight *a,
                              const fast_sight *b, eits_real factor, eits_real *out);
 
-/* ---- report.c ---- */
+/* ---- trust.c ---- */
 
-/* After a frame was aligned: keep ids for the touches that its report may name, and let drives find
- * the touches that only frames have shown. */
-void eits_fast_expect_touches(eits_fast *fast);
 /* Return 1 if the solved frame alone decides where touches are: the drives were left unexplained
  * for so long that the solver was asked, and its touches explain the whole frame. They would not
  * explain a frame in which a finger landed. */
@@ -358,6 +355,12 @@ uint32_t eits_fast_between(const eits_fast *fast, const eits_real (*places)[2], 
  * or moved while the frame was scanned, and the frame could not be aligned. A palm that lands is
  * found as several discs then. */
 int eits_fast_is_smeared(const eits_fast *fast, const eits_touch *found, uint32_t count);
+
+/* ---- report.c ---- */
+
+/* After a frame was aligned: keep ids for the touches that its report may name, and let drives find
+ * the touches that only frames have shown. */
+void eits_fast_expect_touches(eits_fast *fast);
 /* When drives begin again: let them find the touches that they followed before. */
 void eits_fast_expect_again(eits_fast *fast);
 /* Return the id of a touch that starts at `place`. */

@@ -220,6 +220,10 @@
  * these two [of the expected radius]. any other value needs more steps */
 #define EITS_JOINT_FAR_APART R(1.8)
 
+/* and only if the misfit is below this [of the noise]. larger: frames in which a finger lands take
+ * longer; smaller: a touch between two fingers of a chord stays */
+#define EITS_JOINT_FAR_MOST R(4.0)
+
 /* a touch that is found in addition to few others counts if it is farther than this from all of
  * them [of the expected radius]. larger: a touch between two fingers of a chord stays; smaller: a
  * finger that lands at the rim becomes two */

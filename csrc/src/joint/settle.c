@@ -41,20 +41,22 @@ static int may_search(const eits_context *ctx, const eits_joint *j)
 }
 
 /* Whether one of few shapes may stand for two touches: they leave more than noise, or one of them
- * is light and so large that it fits what two touches answer. */
+ * is light and so large that it fits what two touches answer. Much more than noise is left where a
+ * finger lands or slides during the scan; there nothing is sought. */
 static int few_may_miss(const eits_context *ctx, const eits_joint *j)
 {
     int open = leaves_more(ctx, j);
     for (uint32_t k = 0; k < j->count; ++k)
         open |= eits_joint_is_large(ctx, &j->shape[k]);
-    return open && j->count > 1 && j->count < EITS_JOINT_CROWD &&
-           j->count < ctx->options.max_touches && may_search(ctx, j) && !eits_weighs_errors(ctx);
+    return open && eits_joint_excess(ctx, j) < EITS_JOINT_FAR_MOST && j->count > 1 &&
+           j->count < EITS_JOINT_CROWD && j->count < ctx->options.max_touches &&
+           may_search(ctx, j) && !eits_weighs_errors(ctx);
 }
 
 /* Whether touches are sought: in a crowd some may be missing, or too many. */
-static int may_miss(const eits_context *ctx, const eits_joint *j)
+static int crowd_may_miss(const eits_context *ctx, const eits_joint *j)
 {
-    return (j->count >= EITS_JOINT_CROWD && may_search(ctx, j)) || few_may_miss(ctx, j);
+    return j->count >= EITS_JOINT_CROWD && may_search(ctx, j);
 }
 
 /* Whether of few shapes the last ones, from `count` on, are far from all others. While a finger
@@ -111,7 +113,7 @@ void eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_join
         if (j->count * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS &&
             j->misfit > folds + EITS_JOINT_FITS && 3u * (*macs - begin) < most && *macs < j->most)
             try_ellipses(ctx, j, macs);
-        if (may_miss(ctx, j))
+        if (crowd_may_miss(ctx, j))
             try_search(ctx, scratch, j, &first, 0, macs);
     }
     if (few_may_miss(ctx, j))

@@ -161,9 +161,9 @@ def moving_touches() -> tuple[np.ndarray, np.ndarray]:
 
 
 # With the search, 2.1 to 2.5 million in the mean, and at most 4.7 million, except for one random
-# scene, which takes 6.5 million.
+# scene, in which one touch is tried as two far apart: 7.8 million.
 MAX_INSTRUCTIONS = {0: 2_300_000, ALL_TOUCH_FIT: 4_800_000}
-MAX_HARD_SCENE = 7_000_000
+MAX_HARD_SCENE = 8_000_000
 
 
 @pytest.mark.parametrize("warm", [False, True])

@@ -44,10 +44,10 @@ def test_drives_do_not_wait_for_frames(tmp_path):
     assert max(one.solve_us + one.touch_us for one in solved) > 3 * DRIVE_US
     ages_us = [one.packet.head.age_us for one in reported]
     assert np.quantile(ages_us, 0.8) < DRIVE_US and len(reported) > 16 * (FRAMES - 4)
-    # no scan waited, no row was late; one frame is missing, since the touches of the one before it,
-    # in which the finger begins to move, take 22 ms
+    # no scan waited, no row was late; two frames are missing, since the touches of those before
+    # them, in which the finger begins to move, take 22 and 26 ms
     apart_us = [int(us) for us in np.diff([frame.board_us for frame in frames])]
-    assert set(apart_us) <= {SCAN_US, 2 * SCAN_US} and apart_us.count(2 * SCAN_US) <= 1
+    assert set(apart_us) <= {SCAN_US, 2 * SCAN_US} and apart_us.count(2 * SCAN_US) <= 2
     assert {int(us) for us in np.diff([one.board_us for one in reported])} == {DRIVE_US}
     assert (stats.slots_repeated, stats.packets_dropped) == (0, 0)
     assert interrupts[PENDSV] >= 16 * FRAMES
