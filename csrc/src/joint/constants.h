@@ -8,7 +8,8 @@
 /* clang-format off */
 
 /* ---- Chosen: with the prototype on exact frames at 60 dB, seeds 101 and 1002, from the values of
- * touches with a radius of 6 to 12 mm and a contrast of 3 to 10. Check: scripts/test
+ * touches with a radius of 6 to 12 mm and a contrast of 3 to 10; JOINT_FAR_* on chords (seeds 600
+ * to 602) and pianos (seed 47) of hands in time. Check: scripts/test
  * tests/python/acceptance/test_joint_fit.py */
 
 /* expected q = 2 (c - 1) / (c + 1) of a touch with a contrast c of 3 to 10. depends on the touches
