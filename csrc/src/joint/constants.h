@@ -221,6 +221,11 @@
  * these two [of the expected radius]. any other value needs more steps */
 #define EITS_JOINT_FAR_APART R(1.8)
 
+/* the trial is made if the misfit is above this, or if a light touch is large [of the noise].
+ * larger: a touch between two fingers of a chord stays; smaller: noise alone causes trials, each of
+ * which takes as long as a fit */
+#define EITS_JOINT_FAR_LEAVES R(1.35)
+
 /* and only if the misfit is below this [of the noise]. larger: frames in which a finger lands take
  * longer; smaller: a touch between two fingers of a chord stays */
 #define EITS_JOINT_FAR_MOST R(4.0)
