@@ -23,12 +23,6 @@ static void try_ellipses(eits_context *ctx, eits_joint *j, uint64_t *macs)
     eits_joint_back(ctx, j);
 }
 
-/* Whether the shapes leave more than noise. */
-static int leaves_more(const eits_context *ctx, const eits_joint *j)
-{
-    return j->misfit > EITS_JOINT_SEARCHED * eits_joint_freedom(ctx, j);
-}
-
 /* Whether touches may be sought. On a sheet that has drifted the image shows many light touches,
  * which leave much; there nothing is sought. */
 static int may_search(const eits_context *ctx, const eits_joint *j)
@@ -45,7 +39,7 @@ static int may_search(const eits_context *ctx, const eits_joint *j)
  * finger lands or slides during the scan; there nothing is sought. */
 static int few_may_miss(const eits_context *ctx, const eits_joint *j)
 {
-    int open = leaves_more(ctx, j);
+    int open = j->misfit > EITS_JOINT_FAR_LEAVES * eits_joint_freedom(ctx, j);
     for (uint32_t k = 0; k < j->count; ++k)
         open |= eits_joint_is_large(ctx, &j->shape[k]);
     return open && eits_joint_excess(ctx, j) < EITS_JOINT_FAR_MOST && j->count > 1 &&

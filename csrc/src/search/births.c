@@ -364,7 +364,8 @@ static void look_for_split(eits_fast *fast)
         return;
     const eits_real *known = fast->state + FAST_SIZE * k;
     eits_real place[2][2];
-    const eits_real by = EITS_FAST_HALF_PAIR_MM / eits_sqrt(fast_distance2(known, other));
+    const eits_real apart2 = fast_distance2(known, other),
+                    by = apart2 > 0 ? EITS_FAST_HALF_PAIR_MM / eits_sqrt(apart2) : 0;
     for (uint32_t axis = 0; axis < 2; ++axis) {
         const eits_real away = by * (other[axis] - known[axis]);
         place[0][axis] = split_is_known(fast) ? trial->body[0].p[axis] : known[axis] - away;
