@@ -42,7 +42,7 @@ typedef struct fast_sight {
  * elsewhere. */
 typedef enum fast_last { FAST_NOT_SEEN, FAST_AGREED, FAST_ELSEWHERE } fast_last;
 
-/* What may make a frame worse than what drives follow. */
+/* Why the touches that drives follow may be better than those of a frame. */
 enum { FAST_CHANGED = 1, FAST_GROWS = 2 };
 
 /* A tracked touch: its numbers beside those in the state. */

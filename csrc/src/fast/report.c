@@ -204,8 +204,6 @@ static uint32_t nearest(const eits_real *place, const eits_real (*found)[2], con
     return best;
 }
 
-/* ---- what a solved frame is worth ---- */
-
 /* ---- touches that drives may find ---- */
 
 static void expect(eits_fast *fast, uint32_t id, eits_real x_mm, eits_real y_mm)

@@ -1,4 +1,4 @@
-/* How far what the solver found in a frame may be trusted beside what drives follow. */
+/* Whether to believe the solver's touches of a frame, or those that drives follow. */
 #include "fast/fast.h"
 
 #include "fast/constants.h"

@@ -4,9 +4,10 @@
  *     F = sum over folds ((d - answers) / sigma)^2 - (its part along the drift of the gain)
  *         + sum over touches of h(log |q|) + (log(r / R) / dR)^2 + (e_1^2 + e_2^2) / dE^2
  *
- * is minimised by damped Gauss-Newton steps (fit.c). sigma^2, of each fold, is the variance of its
- * noise plus that of the multipole model's own error, which is a fraction of the data (metric.c). h
- * is the lesser of two costs: that of a light touch and that of a strong one (prior.c).
+ * is minimised by damped Gauss-Newton steps (fit.c). Each fold has a sigma^2 of its own: the
+ * variance of its noise plus that of the multipole model's error, which is a fraction of the data
+ * (metric.c). h is the lesser of two costs: that of a light touch and that of a strong one
+ * (prior.c).
  * docs/design/joint-fit.md has the formulas and their sources. */
 #ifndef EITSKIN_JOINT_H
 #define EITSKIN_JOINT_H

@@ -1,9 +1,9 @@
 /* The metric of the joint fit, and what no touch causes.
  *
  * Folds have independent errors, each of a variance of its own: noise, and what the multipole model
- * itself errs by, which grows with the fold's datum. Beside it, the data may have any amount of the
- * drift of the gain, and the model's errors: the second
- * moment s |d|^2 sum e e' (section ROWE), where s grows with the square of the distance of the
+ * itself errs by, which grows with the fold's datum. Beside these, the data may have any amount of
+ * the drift of the gain, and the model's errors: the second moment s |d|^2 sum e e' (section ROWE),
+ * where s grows with the square of the distance of the
  * reference from the model. With W the weights, B the columns W e s^1/2 |d| and g the direction of
  * the drift in that metric,
  *

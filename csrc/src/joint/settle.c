@@ -53,38 +53,48 @@ static int crowd_may_miss(const eits_context *ctx, const eits_joint *j)
     return j->count >= EITS_JOINT_CROWD && may_search(ctx, j);
 }
 
-/* Whether of few shapes the last ones, from `count` on, are far from all others. While a finger
- * lands at the rim, a second shape beside it explains the rows that were measured earlier. */
-static int are_far_apart(const eits_context *ctx, const eits_joint *j, uint32_t count)
+/* Whether the last shape is far from all others. While a finger lands at the rim, a second shape
+ * beside it explains the rows that were measured earlier. */
+static int is_far_apart(const eits_context *ctx, const eits_joint *j)
 {
     const eits_real least = EITS_JOINT_FAR_LEAST * eits_joint_usual(ctx, 0, 0, 0).radius;
-    for (uint32_t n = count; n < j->count && count < EITS_JOINT_CROWD; ++n) {
-        for (uint32_t k = 0; k < n; ++k) {
-            const eits_real dx = j->shape[n].x - j->shape[k].x, dy = j->shape[n].y - j->shape[k].y;
-            if (!(eits_fma(dx, dx, dy * dy) > least * least))
-                return 0;
-        }
+    const eits_shape *last = &j->shape[j->count - 1u];
+    for (const eits_shape *one = j->shape; one < last; ++one) {
+        const eits_real dx = last->x - one->x, dy = last->y - one->y;
+        if (!(eits_fma(dx, dx, dy * dy) > least * least))
+            return 0;
     }
     return 1;
 }
 
-/* Search from `first`, or one of few shapes as two (`apart`); *j becomes what is found, where that
- * fits better, or where a crowd needs fewer touches. Of few, the test says which are none. */
+/* Whether F falls by more than `fall`, times the excess over noise, if `found` takes j's place. */
+static int is_better(const eits_context *ctx, const eits_joint *j, const eits_joint *found,
+                     eits_real fall)
+{
+    return j->cost - found->cost > fall * eits_joint_excess(ctx, found);
+}
+
+/* Search from `discs`; *j becomes what is found, where that fits better, or needs fewer touches. */
 static void try_search(eits_context *ctx, const eits_scratch *scratch, eits_joint *j,
-                       const eits_joint *first, int apart, uint64_t *macs)
+                       const eits_joint *discs, uint64_t *macs)
+{
+    eits_joint found = *discs;
+    eits_joint_keep(ctx, j);
+    eits_joint_search(ctx, scratch, &found, macs);
+    const int fewer = found.count < j->count;
+    if (is_better(ctx, j, &found, fewer ? -EITS_JOINT_NEEDED : EITS_JOINT_SPLIT_FALL))
+        *j = found;
+    else
+        eits_joint_back(ctx, j);
+}
+
+/* One of the few shapes of `first` as two; *j becomes that, where it fits better. */
+static void try_apart(eits_context *ctx, eits_joint *j, const eits_joint *first, uint64_t *macs)
 {
     eits_joint found = *first;
-    if (*macs > eits_joint_limit(ctx, j, UINT64_MAX))
-        return;
     eits_joint_keep(ctx, j);
-    if (apart)
-        eits_joint_set_apart(ctx, &found, macs);
-    else
-        eits_joint_search(ctx, scratch, &found, macs);
-    const int fewer = found.count < j->count && j->count >= EITS_JOINT_CROWD;
-    const eits_real fall = fewer ? -EITS_JOINT_NEEDED : EITS_JOINT_SPLIT_FALL;
-    if (j->cost - found.cost > fall * eits_joint_excess(ctx, &found) &&
-        are_far_apart(ctx, &found, j->count))
+    eits_joint_set_apart(ctx, &found, macs);
+    if (is_better(ctx, j, &found, EITS_JOINT_SPLIT_FALL) && is_far_apart(ctx, &found))
         *j = found;
     else
         eits_joint_back(ctx, j);
@@ -107,11 +117,11 @@ void eits_joint_settle(eits_context *ctx, const eits_scratch *scratch, eits_join
         if (j->count * EITS_JOINT_ELLIPSE <= EITS_JOINT_PARAMETERS &&
             j->misfit > folds + EITS_JOINT_FITS && 3u * (*macs - begin) < most && *macs < j->most)
             try_ellipses(ctx, j, macs);
-        if (crowd_may_miss(ctx, j))
-            try_search(ctx, scratch, j, &first, 0, macs);
+        if (crowd_may_miss(ctx, j) && *macs <= eits_joint_limit(ctx, j, UINT64_MAX))
+            try_search(ctx, scratch, j, &first, macs);
     }
-    if (few_may_miss(ctx, j))
-        try_search(ctx, scratch, j, &first, 1, macs);
+    if (few_may_miss(ctx, j) && *macs <= eits_joint_limit(ctx, j, UINT64_MAX))
+        try_apart(ctx, j, &first, macs);
     if (eits_joint_excess(ctx, j) < EITS_JOINT_LOST)
         eits_joint_split(ctx, j, macs);
     eits_joint_choose_kinds(ctx, j, *macs - begin, macs);

@@ -322,7 +322,7 @@ static int explains(const eits_fast *fast, fast_which which)
     return trial->exists && eits_is_noise(fast, trial, trial->fresh);
 }
 
-/* What the last searches made of a touch serves for a while. */
+/* The two places that the last split found are used again in the next three decisions. */
 static int split_is_known(const eits_fast *fast)
 {
     const fast_search *s = &fast->search;
